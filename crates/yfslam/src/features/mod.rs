@@ -1,0 +1,34 @@
+//! ORB features: what one image alone tells.
+//!
+//! In: a grey image. Out: key points with 256-bit binary descriptors (ORB-SLAM2, IEEE T-RO 2017, section III).
+
+/// A corner found in a pyramid level, in pixels of the full image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct KeyPoint {
+    /// Column in the full, distorted image, px (pixel centres at integers).
+    pub x: f32,
+    /// Row in the full, distorted image, px.
+    pub y: f32,
+    /// Pyramid level in which it was found, 0 is the finest.
+    pub octave: u8,
+    /// Orientation by intensity centroid, radians in [0, 2π), clockwise in the image (x right, y down).
+    pub angle_rad: f32,
+    /// Corner strength, comparable within one level.
+    pub response: f32,
+}
+
+/// A 256-bit rotated BRIEF descriptor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Descriptor(pub [u64; 4]);
+
+impl Descriptor {
+    /// Number of differing bits, 0–256.
+    #[inline]
+    pub fn distance(&self, other: &Self) -> u32 {
+        let (a, b) = (&self.0, &other.0);
+        (a[0] ^ b[0]).count_ones()
+            + (a[1] ^ b[1]).count_ones()
+            + (a[2] ^ b[2]).count_ones()
+            + (a[3] ^ b[3]).count_ones()
+    }
+}

@@ -1,0 +1,90 @@
+//! Image buffers: row-major, tightly packed, top row first.
+
+/// A `width` × `height` image of pixels `T`, row-major without padding.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Image<T> {
+    width: usize,
+    height: usize,
+    data: Vec<T>,
+}
+
+/// 8-bit grey image.
+pub type GrayImage = Image<u8>;
+
+/// 8-bit colour image, channels in the order red, green, blue.
+pub type RgbImage = Image<[u8; 3]>;
+
+impl<T: Copy + Default> Image<T> {
+    /// An image filled with `T::default()`.
+    pub fn new(width: usize, height: usize) -> Self {
+        Self { width, height, data: vec![T::default(); width * height] }
+    }
+
+    /// Takes over `data` (row-major); `None` unless it holds exactly `width * height` pixels.
+    pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {
+        (data.len() == width.checked_mul(height)?).then_some(Self { width, height, data })
+    }
+
+    /// Changes the size, keeping the allocation where it suffices; pixel values are unspecified afterwards.
+    pub fn resize(&mut self, width: usize, height: usize) {
+        self.width = width;
+        self.height = height;
+        self.data.resize(width * height, T::default());
+    }
+}
+
+impl<T> Image<T> {
+    /// Pixels per row.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// All pixels, row-major.
+    pub fn data(&self) -> &[T] {
+        &self.data
+    }
+
+    /// All pixels, row-major.
+    pub fn data_mut(&mut self) -> &mut [T] {
+        &mut self.data
+    }
+
+    /// Row `y`.
+    pub fn row(&self, y: usize) -> &[T] {
+        &self.data[y * self.width..(y + 1) * self.width]
+    }
+
+    /// Row `y`.
+    pub fn row_mut(&mut self, y: usize) -> &mut [T] {
+        &mut self.data[y * self.width..(y + 1) * self.width]
+    }
+
+    /// The pixel at column `x`, row `y`, if inside.
+    pub fn get(&self, x: usize, y: usize) -> Option<&T> {
+        (x < self.width && y < self.height).then(|| &self.data[y * self.width + x])
+    }
+}
+
+/// A depth image in the sensor's own units; 0 means "not measured".
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DepthImage {
+    /// Depth along the optical axis in sensor units; 0 where nothing was measured.
+    pub raw: Image<u16>,
+    /// Metres per sensor unit, such as 1/5000 for TUM recordings.
+    pub metres_per_unit: f32,
+}
+
+impl DepthImage {
+    /// Depth in metres at column `x`, row `y`; `None` outside the image or where nothing was measured.
+    pub fn metres(&self, x: usize, y: usize) -> Option<f32> {
+        match self.raw.get(x, y) {
+            Some(&raw) if raw > 0 => Some(f32::from(raw) * self.metres_per_unit),
+            _ => None,
+        }
+    }
+}

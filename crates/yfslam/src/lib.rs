@@ -1,0 +1,14 @@
+//! RGB-D visual SLAM for scenes in which people walk.
+#![warn(missing_docs)]
+
+pub mod camera;
+pub mod config;
+pub mod detection;
+pub mod features;
+pub mod frame;
+pub mod image;
+
+pub use camera::Camera;
+pub use config::Config;
+pub use detection::{BoundingBox, Detection, Detector, DetectorError};
+pub use frame::RgbdFrame;
