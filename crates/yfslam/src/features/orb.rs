@@ -112,7 +112,7 @@ impl OrbExtractor {
             let (corners, scale) = (&corners.strong, self.scale_factors[octave]);
             orientations(self.level, image, corners, angles);
             blur(self.level, image, blurred, line);
-            self.describer.describe(blurred, corners, angles, &mut out.descriptors);
+            self.describer.describe(self.level, blurred, corners, angles, &mut out.descriptors);
             out.key_points.extend(corners.iter().zip(angles.iter()).map(|(corner, &angle_rad)| KeyPoint {
                 x: (f32::from(corner.x) + 0.5) * scale - 0.5,
                 y: (f32::from(corner.y) + 0.5) * scale - 0.5,
