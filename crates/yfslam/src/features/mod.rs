@@ -6,6 +6,7 @@ mod brief;
 mod cells;
 mod distribute;
 mod fast;
+pub mod matching;
 mod orb;
 mod orientation;
 mod pattern;
