@@ -49,6 +49,36 @@ config_section! {
 }
 
 config_section! {
+    /// Motion-only optimisation (ORB-SLAM2, IEEE T-RO 2017, section III-B).
+    PoseOptimizerConfig {
+        /// Rounds of minimising and re-classifying outliers. Source: ORB-SLAM2.
+        rounds: usize = 4,
+        /// Rounds with the Huber kernel; later ones are plain least squares. Source: ORB-SLAM2.
+        robust_rounds: usize = 2,
+        /// Levenberg-Marquardt steps in a round. Source: ORB-SLAM2.
+        iterations: usize = 10,
+        /// A round ends when a step gains less than this share of the cost.
+        relative_tolerance: f64 = 1e-5,
+        /// First damping, relative to the diagonal.
+        initial_damping: f64 = 1e-5,
+    }
+}
+
+config_section! {
+    /// Bundle adjustment (Triggs et al. 2000; ORB-SLAM2 section III-B).
+    BundleConfig {
+        /// Steps before outliers are dropped. Source: ORB-SLAM2.
+        first_iterations: usize = 5,
+        /// Steps after outliers were dropped. Source: ORB-SLAM2.
+        second_iterations: usize = 10,
+        /// Adjustment ends when a step gains less than this share of the cost.
+        relative_tolerance: f64 = 1e-4,
+        /// First damping, relative to the diagonal.
+        initial_damping: f64 = 1e-4,
+    }
+}
+
+config_section! {
     /// The whole configuration.
     Config {
         /// Feature extraction.

@@ -6,7 +6,9 @@ pub mod config;
 pub mod detection;
 pub mod features;
 pub mod frame;
+pub mod geometry;
 pub mod image;
+pub mod optimize;
 
 pub use camera::Camera;
 pub use config::Config;
