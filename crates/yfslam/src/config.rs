@@ -79,9 +79,131 @@ config_section! {
 }
 
 config_section! {
+    /// What the sensor measures, and how well.
+    DepthConfig {
+        /// Standard deviation of a corner's position at the finest level, px; grows with the scale of the level. Source: ORB-SLAM2.
+        corner_sigma_px: f64 = 1.0,
+        /// n in sigma_z = n z^2, 1/m. ORB-SLAM2's one pixel of disparity amounts to 1/bf = 0.025 at the finest level.
+        noise_per_m: f64 = 0.025,
+        /// Depth up to which a feature becomes a landmark at once, in baselines (bf / fx). Source: ORB-SLAM2's ThDepth.
+        close_limit_baselines: f64 = 40.0,
+        /// Readings beyond are ignored, m. Structured-light cameras see noise there.
+        max_m: f64 = 20.0,
+    }
+}
+
+config_section! {
+    /// Tracking (ORB-SLAM2, IEEE T-RO 2017, section III; ORB-SLAM, IEEE T-RO 2015, section V).
+    TrackingConfig {
+        /// Features needed to start a map. Source: ORB-SLAM2.
+        init_min_features: usize = 500,
+        /// Landmarks with depth needed to start a map.
+        init_min_landmarks: usize = 100,
+        /// Largest Hamming distance of a match in a projection search. Source: ORB-SLAM2's TH_HIGH.
+        hamming_high: u32 = 100,
+        /// Largest Hamming distance of a match without a projection to guide it. Source: ORB-SLAM2's TH_LOW.
+        hamming_low: u32 = 50,
+        /// Search radius around the prediction from the last frame, px at the finest level. Source: ORB-SLAM2.
+        motion_radius_px: f32 = 15.0,
+        /// Matches below which the radius is doubled and the search repeated. Source: ORB-SLAM2.
+        motion_min_matches: usize = 20,
+        /// Inliers with landmarks of the map that the first pose needs. Source: ORB-SLAM2.
+        motion_min_inliers: usize = 10,
+        /// Ratio of best to second-best distance against the reference keyframe. Source: ORB-SLAM2.
+        reference_ratio: f32 = 0.7,
+        /// Matches with the reference keyframe that are needed. Source: ORB-SLAM2.
+        reference_min_matches: usize = 15,
+        /// Features of the last frame that lend their depth to tracking without being landmarks. Source: ORB-SLAM2.
+        borrowed_points: usize = 100,
+        /// Keyframes in the local map at most. Source: ORB-SLAM2.
+        local_keyframes: usize = 80,
+        /// Covisible neighbours that each keyframe brings into the local map. Source: ORB-SLAM2.
+        local_neighbours: usize = 10,
+        /// Search radius for local landmarks seen head on (cosine above 0.998), px at the finest level. Source: ORB-SLAM2.
+        local_radius_narrow_px: f32 = 2.5,
+        /// Search radius for other local landmarks, px at the finest level. Source: ORB-SLAM2.
+        local_radius_px: f32 = 4.0,
+        /// Factor on both radii for RGB-D input. Source: ORB-SLAM2.
+        local_radius_factor: f32 = 3.0,
+        /// Ratio of best to second-best distance at the same level. Source: ORB-SLAM2.
+        local_ratio: f32 = 0.8,
+        /// Least cosine between viewing direction and the landmark's mean direction. Source: ORB-SLAM2.
+        min_view_cosine: f64 = 0.5,
+        /// Inliers in the local map that a tracked frame needs. Source: ORB-SLAM2.
+        local_min_inliers: usize = 30,
+    }
+}
+
+config_section! {
+    /// When a frame becomes a keyframe (ORB-SLAM2, IEEE T-RO 2017, section III-E).
+    KeyframeConfig {
+        /// Share of the reference keyframe's landmarks below which a keyframe is wanted. Source: ORB-SLAM2.
+        reference_ratio: f64 = 0.75,
+        /// The same while there are fewer than two keyframes. Source: ORB-SLAM2.
+        first_reference_ratio: f64 = 0.4,
+        /// Close features tracked below which, and not tracked above which, a keyframe is wanted. Source: ORB-SLAM2.
+        close_tracked: usize = 100,
+        /// See `close_tracked`. Source: ORB-SLAM2.
+        close_untracked: usize = 70,
+        /// Inliers that a keyframe needs. Source: ORB-SLAM2.
+        min_inliers: usize = 15,
+        /// Observation weight that makes a landmark count for the reference (a sight with depth weighs 2). Source: ORB-SLAM2.
+        min_observation_weight: usize = 3,
+        /// Frames between keyframes at least; 0 leaves it to the other rules. Source: ORB-SLAM2 with an idle mapper.
+        min_frames: u64 = 0,
+    }
+}
+
+config_section! {
+    /// Growth and refinement of the map (ORB-SLAM2 section III; ORB-SLAM section VI).
+    MappingConfig {
+        /// Landmarks made from depth beyond the close limit, if fewer close ones exist. Source: ORB-SLAM2.
+        min_depth_landmarks: usize = 100,
+        /// Found/visible below which a young landmark is dropped. Source: ORB-SLAM2.
+        min_found_ratio: f64 = 0.25,
+        /// Keyframes during which a landmark is young. Source: ORB-SLAM2.
+        probation_keyframes: u64 = 3,
+        /// Observation weight a landmark needs after two keyframes. Source: ORB-SLAM2.
+        min_observation_weight: usize = 4,
+        /// Covisible keyframes with which features without landmark are triangulated. Source: ORB-SLAM2.
+        triangulation_neighbours: usize = 10,
+        /// Ratio of best to second-best distance in triangulation. Source: ORB-SLAM2.
+        triangulation_ratio: f32 = 0.6,
+        /// Cosine of the parallax angle above which nothing is triangulated. Source: ORB-SLAM2.
+        max_parallax_cosine: f64 = 0.9998,
+        /// Covisible keyframes in which duplicates are sought. Source: ORB-SLAM2.
+        fuse_neighbours: usize = 10,
+        /// Neighbours of each of those that are searched too. Source: ORB-SLAM2.
+        fuse_second_neighbours: usize = 5,
+        /// Search radius for duplicates, px at the finest level. Source: ORB-SLAM2.
+        fuse_radius_px: f32 = 3.0,
+        /// Keyframes adjusted together at most, best covisible first.
+        window_keyframes: usize = 30,
+        /// Keyframes outside the window that hold it in place at most.
+        window_fixed: usize = 40,
+        /// Share of a keyframe's landmarks seen elsewhere above which it is dropped. Source: ORB-SLAM2.
+        redundant_share: f64 = 0.9,
+        /// Other keyframes that must see a landmark as finely to make a sight redundant. Source: ORB-SLAM2.
+        redundant_views: usize = 3,
+    }
+}
+
+config_section! {
     /// The whole configuration.
     Config {
         /// Feature extraction.
         features: FeatureConfig = FeatureConfig::default(),
+        /// Sensor noise.
+        depth: DepthConfig = DepthConfig::default(),
+        /// Tracking.
+        tracking: TrackingConfig = TrackingConfig::default(),
+        /// Keyframe policy.
+        keyframes: KeyframeConfig = KeyframeConfig::default(),
+        /// Mapping.
+        mapping: MappingConfig = MappingConfig::default(),
+        /// Motion-only optimisation.
+        pose: PoseOptimizerConfig = PoseOptimizerConfig::default(),
+        /// Bundle adjustment.
+        bundle: BundleConfig = BundleConfig::default(),
     }
 }
