@@ -45,6 +45,8 @@ config_section! {
         fast_threshold: u8 = 20,
         /// FAST threshold for cells in which the first finds nothing, grey levels. Source: ORB-SLAM2 settings.
         fast_threshold_low: u8 = 7,
+        /// Side of the cells in which the two FAST thresholds are tried, px of the level. Source: ORB-SLAM2.
+        cell_px: usize = 30,
     }
 }
 

@@ -2,6 +2,18 @@
 //!
 //! In: a grey image. Out: key points with 256-bit binary descriptors (ORB-SLAM2, IEEE T-RO 2017, section III).
 
+mod brief;
+mod distribute;
+mod fast;
+mod orb;
+mod orientation;
+mod pattern;
+
+pub use orb::{Features, OrbExtractor};
+
+/// Radius of the patch from which orientation and descriptor are read, px of the level (Rublee et al., ICCV 2011: patch 31).
+pub const PATCH_RADIUS: usize = 15;
+
 /// A corner found in a pyramid level, in pixels of the full image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct KeyPoint {

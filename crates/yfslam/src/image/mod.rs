@@ -1,5 +1,13 @@
 //! Image buffers: row-major, tightly packed, top row first.
 
+mod blur;
+mod gray;
+mod pyramid;
+
+pub use blur::{BLUR_RADIUS, blur};
+pub use gray::gray_from_rgb;
+pub use pyramid::Pyramid;
+
 /// A `width` × `height` image of pixels `T`, row-major without padding.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Image<T> {

@@ -1,0 +1,148 @@
+//! The ORB extractor: from an image to key points and descriptors.
+//!
+//! In: a grey image. Out: about [`FeatureConfig::count`] oriented, described corners, finest level first (ORB-SLAM2, IEEE T-RO
+//! 2017, section III; Rublee et al., ICCV 2011).
+
+use super::distribute::Distributor;
+use super::fast::Corner;
+use super::{Descriptor, KeyPoint, PATCH_RADIUS, brief, fast, orientation};
+use crate::config::FeatureConfig;
+use crate::image::{BLUR_RADIUS, GrayImage, Pyramid, blur};
+
+/// Distance from the image's edge within which no key point lies, px of the level: patch and blur stay inside.
+const EDGE: usize = PATCH_RADIUS + BLUR_RADIUS + 1;
+
+/// The features of one image; key point `i` has descriptor `i`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Features {
+    /// Where they are.
+    pub key_points: Vec<KeyPoint>,
+    /// What they look like.
+    pub descriptors: Vec<Descriptor>,
+}
+
+/// Extracts ORB features; keeps its buffers from image to image.
+#[derive(Clone, Debug)]
+pub struct OrbExtractor {
+    config: FeatureConfig,
+    scale_factors: Vec<f32>,
+    pyramid: Pyramid,
+    blurred: GrayImage,
+    corners: Vec<Vec<Corner>>,
+    cell_has_strong: Vec<bool>,
+    distributor: Distributor,
+}
+
+impl OrbExtractor {
+    /// An extractor for any image size.
+    pub fn new(config: &FeatureConfig) -> Self {
+        let levels = config.levels.max(1);
+        Self {
+            config: config.clone(),
+            scale_factors: (0..levels).map(|level| config.scale_factor.powi(level as i32)).collect(),
+            pyramid: Pyramid::new(levels, config.scale_factor),
+            blurred: GrayImage::default(),
+            corners: vec![Vec::new(); levels],
+            cell_has_strong: Vec::new(),
+            distributor: Distributor::default(),
+        }
+    }
+
+    /// Scale of each pyramid level relative to the full image, finest (1) first.
+    pub fn scale_factors(&self) -> &[f32] {
+        &self.scale_factors
+    }
+
+    /// Replaces `out` by the features of `gray`; an image too small for a patch has none.
+    pub fn extract(&mut self, gray: &GrayImage, out: &mut Features) {
+        out.key_points.clear();
+        out.descriptors.clear();
+        self.pyramid.build(gray);
+        self.detect();
+        self.distribute();
+        for (octave, corners) in self.corners.iter().enumerate() {
+            let (image, scale) = (&self.pyramid.levels()[octave], self.scale_factors[octave]);
+            blur(image, &mut self.blurred);
+            for corner in corners {
+                let (x, y) = (usize::from(corner.x), usize::from(corner.y));
+                let angle_rad = orientation::orientation(image, x, y);
+                out.descriptors.push(brief::describe(&self.blurred, x, y, angle_rad));
+                out.key_points.push(KeyPoint {
+                    x: (x as f32 + 0.5) * scale - 0.5,
+                    y: (y as f32 + 0.5) * scale - 0.5,
+                    octave: octave as u8,
+                    angle_rad,
+                    response: f32::from(corner.score),
+                });
+            }
+        }
+    }
+
+    /// Finds the corners of all levels; weak ones count only in cells that have no strong one.
+    fn detect(&mut self) {
+        let (strong, cell) = (self.config.fast_threshold, self.config.cell_px.max(1));
+        let weak = self.config.fast_threshold_low.min(strong);
+        for (image, corners) in self.pyramid.levels().iter().zip(&mut self.corners) {
+            fast::detect(image, weak, EDGE, corners);
+            let cells_per_row = image.width() / cell + 1;
+            let cell_of = |corner: &Corner| usize::from(corner.y) / cell * cells_per_row + usize::from(corner.x) / cell;
+            self.cell_has_strong.clear();
+            self.cell_has_strong.resize(cells_per_row * (image.height() / cell + 1), false);
+            for corner in corners.iter().filter(|corner| corner.score > strong) {
+                self.cell_has_strong[cell_of(corner)] = true;
+            }
+            corners.retain(|corner| corner.score > strong || !self.cell_has_strong[cell_of(corner)]);
+        }
+    }
+
+    /// Thins each level out to its quota: geometric over the levels; what a coarse level lacks goes to the finer ones.
+    fn distribute(&mut self) {
+        let total: f32 = self.scale_factors.iter().map(|scale| 1.0 / scale).sum();
+        let mut left = self.config.count;
+        let mut share_left = total;
+        for (corners, scale) in self.corners.iter_mut().zip(&self.scale_factors).rev() {
+            let share = 1.0 / scale;
+            let quota = (left as f32 * share / share_left).round() as usize;
+            self.distributor.select(corners, quota.min(left));
+            left -= corners.len();
+            share_left -= share;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Smooth blobs with corners: a checkerboard of random greys, 8 px a field.
+    fn texture(width: usize, height: usize) -> GrayImage {
+        let data = (0..width * height).map(|i| {
+            let (x, y) = ((i % width / 8) as u32, (i / width / 8) as u32);
+            (x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77)).wrapping_mul(0xc2b2_ae3d).to_be_bytes()[0]
+        });
+        GrayImage::from_vec(width, height, data.collect()).unwrap()
+    }
+
+    #[test]
+    fn any_size_is_accepted() {
+        let mut extractor = OrbExtractor::new(&FeatureConfig::default());
+        let mut features = Features::default();
+        for (width, height) in [(0, 0), (0, 9), (1, 1), (2, 300), (38, 38), (39, 39), (40, 41), (9, 641), (641, 67)] {
+            extractor.extract(&texture(width, height), &mut features);
+            assert_eq!(features.key_points.len(), features.descriptors.len());
+            if width.min(height) < 2 * EDGE + 1 {
+                assert!(features.key_points.is_empty(), "{width}×{height}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_asked_number_is_found_where_there_is_texture() {
+        let mut extractor = OrbExtractor::new(&FeatureConfig::default());
+        let mut features = Features::default();
+        extractor.extract(&texture(640, 480), &mut features);
+        assert_eq!(features.key_points.len(), 1000);
+        let octaves: std::collections::BTreeSet<u8> = features.key_points.iter().map(|k| k.octave).collect();
+        assert_eq!(octaves.len(), 8);
+    }
+}
