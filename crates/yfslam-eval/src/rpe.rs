@@ -65,9 +65,10 @@ impl RpeOptions {
         Self::new(Delta::Frames(1), false)
     }
 
-    /// Drift per second: all pairs that are 1 s apart.
+    /// Drift per second: all pairs that are 1 s apart. The tolerance of 0.05 suits every frame rate from 10 Hz up and keeps out
+    /// spans cut short by a gap in tracking or by the end of the trajectory.
     pub fn per_second() -> Self {
-        Self::new(Delta::Seconds(1.0), true)
+        Self { relative_tolerance: 0.05, ..Self::new(Delta::Seconds(1.0), true) }
     }
 }
 
