@@ -8,9 +8,15 @@ pub mod features;
 pub mod frame;
 pub mod geometry;
 pub mod image;
+pub mod map;
+pub mod mapping;
 pub mod optimize;
+pub mod sensor;
+pub mod system;
+pub mod tracking;
 
 pub use camera::Camera;
 pub use config::Config;
 pub use detection::{BoundingBox, Detection, Detector, DetectorError};
 pub use frame::RgbdFrame;
+pub use system::{Slam, Tracked};

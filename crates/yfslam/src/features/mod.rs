@@ -5,10 +5,13 @@
 mod brief;
 mod distribute;
 mod fast;
+pub mod matching;
+mod frame;
 mod orb;
 mod orientation;
 mod pattern;
 
+pub use frame::{Feature, FrameFeatures, ImageBounds};
 pub use orb::{Features, OrbExtractor};
 
 /// Radius of the patch from which orientation and descriptor are read, px of the level (Rublee et al., ICCV 2011: patch 31).

@@ -151,3 +151,59 @@ fn classify(camera: &Pinhole, pose: &Pose, observations: &mut [PoseObservation])
     }
     inliers
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn observations(camera: &Pinhole, truth: &Pose) -> Vec<PoseObservation> {
+        let t_world_cam = truth.inverse();
+        (0..60)
+            .map(|i| {
+                let (u, v) = (40.0 + 9.5 * f64::from(i), 30.0 + f64::from(i * 37 % 420));
+                let z = 1.0 + 0.1 * f64::from(i * 13 % 30);
+                PoseObservation {
+                    point_world: t_world_cam * camera.unproject(u, v, z),
+                    measurement: Measurement {
+                        u,
+                        v,
+                        disparity: camera.bf / z,
+                        weight_px: 1.0,
+                        weight_disparity: if i % 4 == 0 { 0.0 } else { 1.0 },
+                    },
+                    trust: 1.0,
+                    inlier: true,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_pose_is_recovered_from_a_far_start_despite_outliers() {
+        let camera = Pinhole { fx: 520.0, fy: 510.0, cx: 320.0, cy: 240.0, bf: 40.0 };
+        let truth = se3_exp(&Vector6::new(0.3, -0.2, 0.1, 0.05, -0.4, 0.2));
+        let mut observations = observations(&camera, &truth);
+        for o in observations.iter_mut().step_by(6) {
+            o.measurement.v += 70.0;
+        }
+        let mut pose = se3_exp(&Vector6::new(0.05, 0.04, -0.03, 0.03, -0.05, 0.02)) * truth;
+        let inliers = optimize_pose(&camera, &PoseOptimizerConfig::default(), &mut pose, &mut observations);
+        let error = pose * truth.inverse();
+        assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle() < 1e-6, "{error}");
+        assert_eq!(inliers, 50);
+    }
+
+    #[test]
+    fn a_distrusted_observation_does_not_move_the_pose() {
+        let camera = Pinhole { fx: 520.0, fy: 510.0, cx: 320.0, cy: 240.0, bf: 40.0 };
+        let truth = Pose::translation(0.1, 0.0, 0.2);
+        let mut observations = observations(&camera, &truth);
+        for o in observations.iter_mut().take(20) {
+            o.measurement.u += 2.0;
+            o.trust = 0.0;
+        }
+        let mut pose = truth;
+        optimize_pose(&camera, &PoseOptimizerConfig::default(), &mut pose, &mut observations);
+        assert!((pose * truth.inverse()).translation.vector.norm() < 1e-9);
+    }
+}

@@ -33,6 +33,7 @@ pub struct TrackedFrame {
     pub reference: Option<(KeyFrameId, Pose)>,
     observations: Vec<PoseObservation>,
     observed: Vec<u32>,
+    nearest: Vec<(f32, u32)>,
 }
 
 impl TrackedFrame {
@@ -69,7 +70,21 @@ impl TrackedFrame {
                 inlier: true,
             });
         }
+        let before = self.t_cam_world;
         optimize_pose(&sensor.pinhole, config, &mut self.t_cam_world, &mut self.observations);
+        {
+            let mut a = [[0;2];8];
+            let mut rs = vec![];
+            for (&i, o) in self.observed.iter().zip(&self.observations) {
+                a[self.features.features[i as usize].octave as usize][o.inlier as usize] += 1;
+                let p = (self.t_cam_world*o.point_world).coords;
+                let r = o.measurement.residual(&sensor.pinhole,&p);
+                rs.push((r.x,r.y,r.z));
+            }
+            rs.sort_by(|a,b|a.0.total_cmp(&b.0)); 
+            let q = |f:&dyn Fn(&(f64,f64,f64))->f64| { let mut v:Vec<f64>=rs.iter().map(f).collect(); v.sort_by(f64::total_cmp); [v[v.len()/10],v[v.len()/4],v[v.len()/2],v[v.len()*3/4],v[v.len()*9/10]]};
+            eprintln!("{a:?} moved {:?}\n  {:.2?} {:.2?} {:.2?}", { let m= self.t_cam_world*before.inverse(); (m.translation.vector.norm(), m.rotation.angle())}, q(&|r|r.0),q(&|r|r.1),q(&|r|r.2));
+        }
         let mut on_map = 0;
         for (&i, o) in self.observed.iter().zip(&self.observations) {
             let sight = &mut self.sights[i as usize];
@@ -80,6 +95,27 @@ impl TrackedFrame {
             }
         }
         on_map
+    }
+
+    /// Lends unmatched features with depth to the next frame as points: all close ones, at least the `at_least` closest. They never
+    /// enter the map.
+    pub fn borrow_depth_points(&mut self, sensor: &SensorModel, at_least: usize) {
+        let t_world_cam = self.t_cam_world.inverse();
+        self.nearest.clear();
+        for (i, f) in self.features.features.iter().enumerate() {
+            if let (Some(z), true) = (f.depth_m, self.is_open(i)) {
+                self.nearest.push((z, i as u32));
+            }
+        }
+        self.nearest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for (n, &(z, i)) in self.nearest.iter().enumerate() {
+            if f64::from(z) > sensor.close_limit_m && n >= at_least {
+                break;
+            }
+            let f = &self.features.features[i as usize];
+            let point = sensor.pinhole.unproject(f64::from(f.u), f64::from(f.v), f64::from(z));
+            self.sights[i as usize] = Some(Sight { landmark: None, point_world: t_world_cam * point });
+        }
     }
 
     /// Brings pose and matched points up to date after the map moved; matches to landmarks that are gone are dropped.

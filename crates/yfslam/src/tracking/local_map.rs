@@ -62,19 +62,19 @@ impl LocalMap {
         let direct = self.keyframes.len();
         for i in 0..direct {
             let Some(keyframe) = map.keyframe(self.keyframes[i]) else { continue };
+            if self.keyframes.len() >= config.local_keyframes {
+                return;
+            }
+            let is_new = |id: &KeyFrameId, votes: &SecondaryMap<KeyFrameId, u32>| !votes.contains_key(*id);
             let covisible = keyframe.covisible.iter().take(config.local_neighbours).map(|(id, _)| *id);
-            for mut group in [
-                &mut covisible.into_iter() as &mut dyn Iterator<Item = KeyFrameId>,
-                &mut keyframe.children.iter().copied(),
-                &mut keyframe.parent.into_iter(),
-            ] {
-                if self.keyframes.len() >= config.local_keyframes {
-                    return;
-                }
-                let votes = &mut self.votes;
-                if let Some(new) = group.by_ref().find(|id| !votes.contains_key(*id)) {
-                    votes.insert(new, 0);
-                    self.keyframes.push(new);
+            let brought = [
+                covisible.clone().find(|id| is_new(id, &self.votes)),
+                keyframe.children.iter().copied().find(|id| is_new(id, &self.votes)),
+                keyframe.parent.filter(|id| is_new(id, &self.votes)),
+            ];
+            for id in brought.into_iter().flatten() {
+                if self.votes.insert(id, 0).is_none() {
+                    self.keyframes.push(id);
                 }
             }
         }
