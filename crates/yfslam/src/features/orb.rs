@@ -3,11 +3,15 @@
 //! In: a grey image. Out: about [`FeatureConfig::count`] oriented, described corners, finest level first (ORB-SLAM2, IEEE T-RO
 //! 2017, section III; Rublee et al., ICCV 2011).
 
+use fearless_simd::Level;
+
+use super::brief::Describer;
 use super::distribute::Distributor;
-use super::fast::Corner;
-use super::{Descriptor, KeyPoint, PATCH_RADIUS, brief, fast, orientation};
+use super::fast::{self, Corner};
+use super::orientation::orientations;
+use super::{Descriptor, KeyPoint, PATCH_RADIUS};
 use crate::config::FeatureConfig;
-use crate::image::{BLUR_RADIUS, GrayImage, Pyramid, blur};
+use crate::image::{BLUR_RADIUS, GrayImage, Plane, Pyramid, blur};
 
 /// Distance from the image's edge within which no key point lies, px of the level: patch and blur stay inside.
 const EDGE: usize = PATCH_RADIUS + BLUR_RADIUS + 1;
@@ -25,26 +29,40 @@ pub struct Features {
 #[derive(Clone, Debug)]
 pub struct OrbExtractor {
     config: FeatureConfig,
+    level: Level,
     scale_factors: Vec<f32>,
     pyramid: Pyramid,
-    blurred: GrayImage,
     corners: Vec<Vec<Corner>>,
-    cell_has_strong: Vec<bool>,
     distributor: Distributor,
+    describer: Describer,
+    buffers: Buffers,
+}
+
+/// What one pyramid level needs for itself.
+#[derive(Clone, Debug, Default)]
+struct Buffers {
+    scores: [Vec<u8>; 3],
+    cell_has_strong: Vec<bool>,
+    angles: Vec<f32>,
+    blurred: Plane,
+    line: Vec<u8>,
 }
 
 impl OrbExtractor {
     /// An extractor for any image size.
     pub fn new(config: &FeatureConfig) -> Self {
-        let levels = config.levels.max(1);
+        let level = Level::new();
+        let pyramid = Pyramid::new(level, config.levels, config.scale_factor);
+        let levels = pyramid.planes().len();
         Self {
             config: config.clone(),
-            scale_factors: (0..levels).map(|level| config.scale_factor.powi(level as i32)).collect(),
-            pyramid: Pyramid::new(levels, config.scale_factor),
-            blurred: GrayImage::default(),
+            level,
+            scale_factors: (0..levels).map(|octave| pyramid.scale_factor().powi(octave as i32)).collect(),
+            pyramid,
             corners: vec![Vec::new(); levels],
-            cell_has_strong: Vec::new(),
             distributor: Distributor::default(),
+            describer: Describer::new(),
+            buffers: Buffers::default(),
         }
     }
 
@@ -60,52 +78,55 @@ impl OrbExtractor {
         self.pyramid.build(gray);
         self.detect();
         self.distribute();
-        for (octave, corners) in self.corners.iter().enumerate() {
-            let (image, scale) = (&self.pyramid.levels()[octave], self.scale_factors[octave]);
-            blur(image, &mut self.blurred);
-            for corner in corners {
-                let (x, y) = (usize::from(corner.x), usize::from(corner.y));
-                let angle_rad = orientation::orientation(image, x, y);
-                out.descriptors.push(brief::describe(&self.blurred, x, y, angle_rad));
-                out.key_points.push(KeyPoint {
-                    x: (x as f32 + 0.5) * scale - 0.5,
-                    y: (y as f32 + 0.5) * scale - 0.5,
-                    octave: octave as u8,
-                    angle_rad,
-                    response: f32::from(corner.score),
-                });
-            }
-        }
+        self.describe(out);
     }
 
     /// Finds the corners of all levels; weak ones count only in cells that have no strong one.
     fn detect(&mut self) {
         let (strong, cell) = (self.config.fast_threshold, self.config.cell_px.max(1));
         let weak = self.config.fast_threshold_low.min(strong);
-        for (image, corners) in self.pyramid.levels().iter().zip(&mut self.corners) {
-            fast::detect(image, weak, EDGE, corners);
+        for (image, corners) in self.pyramid.planes().iter().zip(&mut self.corners) {
+            fast::detect(self.level, image, weak, EDGE, &mut self.buffers.scores, corners);
             let cells_per_row = image.width() / cell + 1;
             let cell_of = |corner: &Corner| usize::from(corner.y) / cell * cells_per_row + usize::from(corner.x) / cell;
-            self.cell_has_strong.clear();
-            self.cell_has_strong.resize(cells_per_row * (image.height() / cell + 1), false);
+            let has_strong = &mut self.buffers.cell_has_strong;
+            has_strong.clear();
+            has_strong.resize(cells_per_row * (image.height() / cell + 1), false);
             for corner in corners.iter().filter(|corner| corner.score > strong) {
-                self.cell_has_strong[cell_of(corner)] = true;
+                has_strong[cell_of(corner)] = true;
             }
-            corners.retain(|corner| corner.score > strong || !self.cell_has_strong[cell_of(corner)]);
+            corners.retain(|corner| corner.score > strong || !has_strong[cell_of(corner)]);
         }
     }
 
     /// Thins each level out to its quota: geometric over the levels; what a coarse level lacks goes to the finer ones.
     fn distribute(&mut self) {
-        let total: f32 = self.scale_factors.iter().map(|scale| 1.0 / scale).sum();
         let mut left = self.config.count;
-        let mut share_left = total;
+        let mut share_left: f32 = self.scale_factors.iter().map(|scale| 1.0 / scale).sum();
         for (corners, scale) in self.corners.iter_mut().zip(&self.scale_factors).rev() {
             let share = 1.0 / scale;
             let quota = (left as f32 * share / share_left).round() as usize;
             self.distributor.select(corners, quota.min(left));
             left -= corners.len();
             share_left -= share;
+        }
+    }
+
+    /// Orients and describes the selected corners.
+    fn describe(&mut self, out: &mut Features) {
+        let Buffers { angles, blurred, line, .. } = &mut self.buffers;
+        for (octave, (image, corners)) in self.pyramid.planes().iter().zip(&self.corners).enumerate() {
+            let scale = self.scale_factors[octave];
+            orientations(self.level, image, corners, angles);
+            blur(self.level, image, blurred, line);
+            self.describer.describe(blurred, corners, angles, &mut out.descriptors);
+            out.key_points.extend(corners.iter().zip(angles.iter()).map(|(corner, &angle_rad)| KeyPoint {
+                x: (f32::from(corner.x) + 0.5) * scale - 0.5,
+                y: (f32::from(corner.y) + 0.5) * scale - 0.5,
+                octave: octave as u8,
+                angle_rad,
+                response: f32::from(corner.score),
+            }));
         }
     }
 }

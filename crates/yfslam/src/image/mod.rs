@@ -2,11 +2,14 @@
 
 mod blur;
 mod gray;
+pub(crate) mod kernels;
+pub(crate) mod plane;
 mod pyramid;
 
-pub use blur::{BLUR_RADIUS, blur};
+pub(crate) use blur::{BLUR_RADIUS, blur};
 pub use gray::gray_from_rgb;
-pub use pyramid::Pyramid;
+pub(crate) use plane::{LANES, Plane};
+pub(crate) use pyramid::Pyramid;
 
 /// A `width` × `height` image of pixels `T`, row-major without padding.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

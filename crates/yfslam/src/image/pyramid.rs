@@ -3,68 +3,213 @@
 //! In: a grey image. Out: the same image at scales 1, 1/s, 1/s², … Pixel areas are aligned: the centre of pixel `x` of
 //! level `l` lies at `(x + 0.5) · s^l − 0.5` of level 0.
 
-use super::GrayImage;
+use fearless_simd::{Level, dispatch, prelude::*};
 
-/// A stack of images, each `scale_factor` times smaller than the one before; buffers are reused from frame to frame.
+use super::GrayImage;
+use super::kernels::{even, lerp, load, odd, store};
+use super::plane::{LANES, Plane};
+
+/// A stack of images, each a constant factor smaller than the one before; buffers are reused from frame to frame.
 #[derive(Clone, Debug)]
-pub struct Pyramid {
+pub(crate) struct Pyramid {
+    level: Level,
     scale_factor: f32,
-    levels: Vec<GrayImage>,
+    planes: Vec<Plane>,
+    /// Column taps from plane `i` to plane `i + 1`.
+    columns: Vec<Taps>,
+    line: Vec<u8>,
 }
 
 impl Pyramid {
-    /// An empty pyramid of `levels` levels (at least 1), each `scale_factor` (at least 1) times smaller than the one before.
-    pub fn new(levels: usize, scale_factor: f32) -> Self {
-        Self { scale_factor: scale_factor.max(1.0), levels: vec![GrayImage::default(); levels.max(1)] }
-    }
-
-    /// Fills all levels from `image`, which becomes level 0.
-    pub fn build(&mut self, image: &GrayImage) {
-        let Some((base, rest)) = self.levels.split_first_mut() else { return };
-        base.resize(image.width(), image.height());
-        base.data_mut().copy_from_slice(image.data());
-        let mut finer = &*base;
-        for level in rest {
-            let size = |finer: usize| (finer as f32 / self.scale_factor).round() as usize;
-            level.resize(size(finer.width()), size(finer.height()));
-            resample(finer, self.scale_factor, level);
-            finer = level;
+    /// An empty pyramid of `planes` images (at least 1), each `scale_factor` (in 1–2) times smaller than the one before.
+    pub fn new(level: Level, planes: usize, scale_factor: f32) -> Self {
+        let planes = planes.max(1);
+        Self {
+            level,
+            scale_factor: scale_factor.clamp(1.0, 2.0),
+            planes: vec![Plane::default(); planes],
+            columns: vec![Taps::default(); planes - 1],
+            line: Vec::new(),
         }
     }
 
-    /// All levels, finest first.
-    pub fn levels(&self) -> &[GrayImage] {
-        &self.levels
+    /// Fills all planes from `image`, which becomes the first.
+    pub fn build(&mut self, image: &GrayImage) {
+        let Some((base, rest)) = self.planes.split_first_mut() else { return };
+        base.copy_from(image);
+        let mut finer = &*base;
+        for (plane, columns) in rest.iter_mut().zip(&mut self.columns) {
+            plane.resize(smaller(finer.width(), self.scale_factor), smaller(finer.height(), self.scale_factor));
+            columns.prepare(self.scale_factor, finer.width(), plane.width(), lanes(self.level));
+            self.line.resize(finer.stride() + 2 * LANES, 0);
+            resample(self.level, finer, self.scale_factor, columns, plane, &mut self.line);
+            finer = plane;
+        }
+    }
+
+    /// Ratio between the scales of neighbouring planes.
+    pub fn scale_factor(&self) -> f32 {
+        self.scale_factor
+    }
+
+    /// All planes, finest first.
+    pub fn planes(&self) -> &[Plane] {
+        &self.planes
     }
 }
 
-/// Index of the left neighbour and weight of the right one in 1/256 for the output pixel `i`.
-fn tap(i: usize, scale: f32, len: usize) -> (usize, u16) {
+/// Side of the next smaller plane; bilinear resampling needs two pixels on each side.
+fn smaller(len: usize, scale: f32) -> usize {
+    if len < 2 { 0 } else { (len as f32 / scale).round() as usize }
+}
+
+/// Where each output pixel of a row lies between input pixels, in blocks of one vector.
+#[derive(Clone, Debug, Default)]
+struct Taps {
+    input: usize,
+    /// First input pixel of each block.
+    base: Vec<usize>,
+    /// Left neighbour of each output pixel, relative to its block's base.
+    left: Vec<u8>,
+    /// Weight of the right neighbour, in 1/256.
+    weight: Vec<u8>,
+}
+
+impl Taps {
+    /// Computes the taps from `input` to `output` pixels in blocks of `lanes`, unless they stand already.
+    fn prepare(&mut self, scale: f32, input: usize, output: usize, lanes: usize) {
+        let padded = output.next_multiple_of(lanes);
+        if self.input == input && self.left.len() == padded {
+            return;
+        }
+        self.input = input;
+        self.base.clear();
+        self.left.clear();
+        self.weight.clear();
+        for x in 0..padded {
+            let (left, weight) = tap(x.min(output - 1), scale, input);
+            if x % lanes == 0 {
+                self.base.push(left);
+            }
+            let base = self.base.last().copied().unwrap_or(0);
+            self.left.push((left - base) as u8);
+            self.weight.push(weight);
+        }
+    }
+}
+
+/// Left neighbour of output pixel `i` among `len` (≥ 2) input pixels, and the weight of the right one in 1/256.
+fn tap(i: usize, scale: f32, len: usize) -> (usize, u8) {
     let position = ((i as f32 + 0.5) * scale - 0.5).clamp(0.0, (len - 1) as f32);
-    let fixed = (position * 256.0).round() as usize;
-    let left = (fixed >> 8).min(len.saturating_sub(2));
-    (left, (fixed - (left << 8)) as u16)
+    let left = (position as usize).min(len - 2);
+    (left, ((position - left as f32) * 256.0).round().min(255.0) as u8)
 }
 
-/// Weighted mean of `a` and `b`, rounded; `weight` of `b` in 1/256.
-#[inline(always)]
-fn lerp(a: u8, b: u8, weight: u16) -> u8 {
-    ((u16::from(a) * (256 - weight) + u16::from(b) * weight + 128) >> 8) as u8
-}
-
-fn resample(src: &GrayImage, scale: f32, dst: &mut GrayImage) {
-    if src.width() < 2 || src.height() < 2 {
-        dst.resize(0, 0);
-        return;
+/// Bytes in the native vector.
+fn lanes(level: Level) -> usize {
+    #[inline(always)]
+    fn of<S: Simd>(_: S) -> usize {
+        S::u8s::LEN
     }
+    dispatch!(level, simd => of(simd))
+}
+
+fn resample(level: Level, src: &Plane, scale: f32, columns: &Taps, dst: &mut Plane, line: &mut [u8]) {
+    dispatch!(level, simd => resample_rows(simd, src, scale, columns, dst, line));
+}
+
+/// Blends two rows of `src` into `line`, then neighbours of `line` into a row of `dst`.
+#[inline(always)]
+fn resample_rows<S: Simd>(simd: S, src: &Plane, scale: f32, columns: &Taps, dst: &mut Plane, line: &mut [u8]) {
+    let lanes = S::u8s::LEN;
     for y in 0..dst.height() {
-        let (top, weight_y) = tap(y, scale, src.height());
+        let (top, weight) = tap(y, scale, src.height());
         let (above, below) = (src.row(top), src.row(top + 1));
-        for (x, out) in dst.row_mut(y).iter_mut().enumerate() {
-            let (left, weight_x) = tap(x, scale, src.width());
-            let a = lerp(above[left], below[left], weight_y);
-            let b = lerp(above[left + 1], below[left + 1], weight_y);
-            *out = lerp(a, b, weight_x);
+        let weight = S::u16s::splat(simd, u16::from(weight));
+        for x in (0..src.width()).step_by(lanes) {
+            store::<S>(line, x, lerp::<S>(load(simd, above, x), load(simd, below, x), (weight, weight)));
+        }
+        let out = dst.row_mut(y);
+        for (block, &base) in columns.base.iter().enumerate() {
+            let x = block * lanes;
+            let (low, high) = (load(simd, line, base), load(simd, line, base + lanes));
+            let index = load(simd, &columns.left, x);
+            let weight = load(simd, &columns.weight, x);
+            let left = low.concat_swizzle_dyn(high, index);
+            let right = low.concat_swizzle_dyn(high, index + 1);
+            store::<S>(out, x, lerp::<S>(left, right, (even::<S>(weight), odd::<S>(weight))));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::kernels::tests::levels;
+    use super::super::plane::tests::images;
+    use super::*;
+
+    /// The same arithmetic, pixel by pixel: rows first, rounded, then columns.
+    fn resampled(src: &Plane, scale: f32, x: usize, y: usize) -> u8 {
+        let lerp = |a: u8, b: u8, weight: u8| {
+            let weight = u32::from(weight);
+            ((u32::from(a) * (256 - weight) + u32::from(b) * weight + 128) >> 8) as u8
+        };
+        let ((left, weight_x), (top, weight_y)) = (tap(x, scale, src.width()), tap(y, scale, src.height()));
+        let column = |x: usize| lerp(src.row(top)[x], src.row(top + 1)[x], weight_y);
+        lerp(column(left), column(left + 1), weight_x)
+    }
+
+    proptest! {
+        #[test]
+        fn every_level_agrees_with_the_scalar_twin(image in images(0..150), scale in 1f32..=2.0) {
+            for level in levels() {
+                let mut pyramid = Pyramid::new(level, 3, scale);
+                pyramid.build(&image);
+                for pair in pyramid.planes().windows(2) {
+                    for y in 0..pair[1].height() {
+                        for x in 0..pair[1].width() {
+                            let expected = resampled(&pair[0], scale, x, y);
+                            prop_assert_eq!(pair[1].row(y)[x], expected, "{:?} at {}, {}", level, x, y);
+                        }
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn another_size_leaves_no_trace(first in images(0..90), second in images(0..90)) {
+            let fresh = |image: &GrayImage| {
+                let mut pyramid = Pyramid::new(Level::new(), 4, 1.2);
+                pyramid.build(image);
+                pyramid
+            };
+            let mut reused = fresh(&first);
+            reused.build(&second);
+            for (a, b) in reused.planes().iter().zip(fresh(&second).planes()) {
+                prop_assert_eq!((a.width(), a.height()), (b.width(), b.height()));
+                for y in 0..a.height() {
+                    prop_assert_eq!(&a.row(y)[..a.width()], &b.row(y)[..b.width()]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_ramp_keeps_its_place() {
+        let ramp = GrayImage::from_vec(200, 4, (0..800).map(|i| (i % 200) as u8).collect()).unwrap();
+        let mut pyramid = Pyramid::new(Level::new(), 8, 1.2);
+        pyramid.build(&ramp);
+        for (level, plane) in pyramid.planes().iter().enumerate().take(5) {
+            let scale = 1.2f32.powi(level as i32);
+            for x in 1..plane.width() - 2 {
+                let expected = (x as f32 + 0.5) * scale - 0.5;
+                assert!(
+                    (f32::from(plane.row(0)[x]) - expected).abs() <= 0.5 * (level + 1) as f32,
+                    "level {level}, column {x}"
+                );
+            }
         }
     }
 }

@@ -1,0 +1,104 @@
+//! Grey images with room behind each row.
+//!
+//! In: a grey image. Out: a copy whose rows end in padding, so that kernels work in whole vectors and need no tail.
+
+use super::GrayImage;
+
+/// The widest vector of any instruction set, in bytes; also the alignment of a row.
+pub(crate) const LANES: usize = 64;
+
+/// What a kernel may touch behind the last pixel of a row: one vector, shifted by the radius of a neighbourhood.
+const PADDING: usize = LANES + 8;
+
+/// An 8-bit image with padded rows; pixels in the padding are unspecified.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Plane {
+    width: usize,
+    height: usize,
+    stride: usize,
+    data: Vec<u8>,
+}
+
+impl Plane {
+    /// Changes the size, keeping the allocation where it suffices; pixel values are unspecified afterwards.
+    pub fn resize(&mut self, width: usize, height: usize) {
+        self.width = width;
+        self.height = height;
+        self.stride = (width + PADDING).next_multiple_of(LANES);
+        self.data.resize(self.stride * height, 0);
+    }
+
+    /// Becomes a copy of `image`.
+    pub fn copy_from(&mut self, image: &GrayImage) {
+        self.resize(image.width(), image.height());
+        for (row, source) in
+            self.data.chunks_exact_mut(self.stride).zip(image.data().chunks_exact(image.width().max(1)))
+        {
+            row[..source.len()].copy_from_slice(source);
+        }
+    }
+
+    /// Pixels per row, padding excluded.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Distance between rows in `data`, px.
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// All rows with their padding.
+    pub fn data(&self) -> &[u8] {
+        &self.data
+    }
+
+    /// Row `y` with its padding.
+    pub fn row(&self, y: usize) -> &[u8] {
+        &self.data[y * self.stride..(y + 1) * self.stride]
+    }
+
+    /// Row `y` with its padding.
+    pub fn row_mut(&mut self, y: usize) -> &mut [u8] {
+        &mut self.data[y * self.stride..(y + 1) * self.stride]
+    }
+}
+
+#[cfg(test)]
+impl From<&GrayImage> for Plane {
+    fn from(image: &GrayImage) -> Self {
+        let mut plane = Self::default();
+        plane.copy_from(image);
+        plane
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Images of any size in `sides`, from flat to noisy.
+    pub(crate) fn images(sides: std::ops::Range<usize>) -> impl Strategy<Value = GrayImage> {
+        (sides.clone(), sides, 0u8..=255, 0u8..=255).prop_flat_map(|(width, height, a, b)| {
+            proptest::collection::vec(a.min(b)..=a.max(b), width * height)
+                .prop_map(move |data| GrayImage::from_vec(width, height, data).unwrap())
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn a_copy_has_the_same_rows(image in images(0..90)) {
+            let plane = Plane::from(&image);
+            for y in 0..image.height() {
+                prop_assert_eq!(&plane.row(y)[..image.width()], image.row(y));
+            }
+        }
+    }
+}
