@@ -4,7 +4,7 @@ mod pinhole;
 mod se3;
 
 pub use pinhole::Pinhole;
-pub use se3::{se3_exp, se3_log, skew};
+pub use se3::{perturbed, se3_exp, se3_log, skew};
 
 /// A rigid motion; `t_a_b` maps points given in frame b into frame a.
 pub type Pose = nalgebra::Isometry3<f64>;

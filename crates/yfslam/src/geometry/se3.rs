@@ -29,6 +29,14 @@ pub fn se3_exp(xi: &Vector6<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(t), UnitQuaternion::from_scaled_axis(phi))
 }
 
+/// The pose after a left perturbation, `exp(xi) * pose`, with its quaternion brought back to unit length: an error of rounding
+/// doubles with each product of a pose and an inverse, and constant-velocity prediction makes two such products a frame.
+pub fn perturbed(xi: &Vector6<f64>, pose: &Isometry3<f64>) -> Isometry3<f64> {
+    let mut moved = se3_exp(xi) * pose;
+    moved.rotation.renormalize();
+    moved
+}
+
 /// Logarithm of a rigid motion, the inverse of [`se3_exp`] for rotations below π.
 pub fn se3_log(pose: &Isometry3<f64>) -> Vector6<f64> {
     let phi = pose.rotation.scaled_axis();
@@ -64,6 +72,18 @@ mod tests {
             let identity = se3_exp(&xi) * se3_exp(&-xi);
             prop_assert!(identity.translation.vector.norm() < 1e-12 && identity.rotation.angle() < 1e-7);
         }
+    }
+
+    #[test]
+    fn prediction_and_correction_keep_the_rotation_a_rotation() {
+        let mut last = Isometry3::identity();
+        let mut velocity = se3_exp(&Vector6::new(0.01, 0.0, 0.02, 0.01, -0.02, 0.005));
+        for _ in 0..1000 {
+            let current = perturbed(&Vector6::new(1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0), &(velocity * last));
+            velocity = current * last.inverse();
+            last = current;
+        }
+        assert!((last.rotation.quaternion().norm() - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 
 use crate::config::PoseOptimizerConfig;
-use crate::geometry::{Pinhole, Pose, se3_exp};
+use crate::geometry::{Pinhole, Pose, perturbed};
 use crate::optimize::residual::{Measurement, huber, projection_jacobian};
 
 /// A landmark seen in the frame whose pose is wanted.
@@ -64,7 +64,7 @@ fn minimise(
         let Some(step) = damped.cholesky().map(|c| c.solve(&b)) else {
             return;
         };
-        let candidate = se3_exp(&step) * *pose;
+        let candidate = perturbed(&step, pose);
         let (h_new, b_new, cost_new) = linearise(camera, robust, &candidate, observations);
         // A comparison with NaN is false: a step into nonsense is never taken.
         if cost_new <= cost {
@@ -155,6 +155,7 @@ fn classify(camera: &Pinhole, pose: &Pose, observations: &mut [PoseObservation])
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::se3_exp;
 
     fn observations(camera: &Pinhole, truth: &Pose) -> Vec<PoseObservation> {
         let t_world_cam = truth.inverse();

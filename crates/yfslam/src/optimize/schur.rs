@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
 
 use crate::config::BundleConfig;
-use crate::geometry::{Pinhole, Pose, se3_exp, skew};
+use crate::geometry::{Pinhole, Pose, perturbed, skew};
 use crate::optimize::residual::{Measurement, huber, projection_jacobian};
 
 type Matrix6x3 = SMatrix<f64, 6, 3>;
@@ -262,7 +262,7 @@ impl NormalEquations {
         };
         let mut poses = problem.poses.clone();
         for (k, pose) in poses.iter_mut().take(n).enumerate() {
-            *pose = se3_exp(&solution.fixed_rows::<6>(6 * k).into()) * *pose;
+            *pose = perturbed(&solution.fixed_rows::<6>(6 * k).into(), pose);
         }
         let mut points = problem.points.clone();
         for (point, position) in points.iter_mut().enumerate() {
@@ -282,7 +282,7 @@ impl NormalEquations {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector6;
+    use crate::geometry::se3_exp;
 
     fn scene(noise: f64) -> (BundleProblem, BundleProblem) {
         let camera = Pinhole { fx: 520.0, fy: 520.0, cx: 320.0, cy: 240.0, bf: 40.0 };

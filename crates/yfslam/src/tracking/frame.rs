@@ -70,21 +70,7 @@ impl TrackedFrame {
                 inlier: true,
             });
         }
-        let before = self.t_cam_world;
         optimize_pose(&sensor.pinhole, config, &mut self.t_cam_world, &mut self.observations);
-        {
-            let mut a = [[0;2];8];
-            let mut rs = vec![];
-            for (&i, o) in self.observed.iter().zip(&self.observations) {
-                a[self.features.features[i as usize].octave as usize][o.inlier as usize] += 1;
-                let p = (self.t_cam_world*o.point_world).coords;
-                let r = o.measurement.residual(&sensor.pinhole,&p);
-                rs.push((r.x,r.y,r.z));
-            }
-            rs.sort_by(|a,b|a.0.total_cmp(&b.0)); 
-            let q = |f:&dyn Fn(&(f64,f64,f64))->f64| { let mut v:Vec<f64>=rs.iter().map(f).collect(); v.sort_by(f64::total_cmp); [v[v.len()/10],v[v.len()/4],v[v.len()/2],v[v.len()*3/4],v[v.len()*9/10]]};
-            eprintln!("{a:?} moved {:?}\n  {:.2?} {:.2?} {:.2?}", { let m= self.t_cam_world*before.inverse(); (m.translation.vector.norm(), m.rotation.angle())}, q(&|r|r.0),q(&|r|r.1),q(&|r|r.2));
-        }
         let mut on_map = 0;
         for (&i, o) in self.observed.iter().zip(&self.observations) {
             let sight = &mut self.sights[i as usize];

@@ -74,11 +74,8 @@ impl Tracker {
             self.current.clear_sights();
             self.current.t_cam_world = prediction;
             let radius = factor * c.motion_radius_px;
-            let n = search_last_frame(sensor, c, &self.last, &mut self.current, radius);
-            if n >= c.motion_min_matches {
-                let r = self.current.refine_pose(sensor, &config.pose);
-                eprintln!("motion {n} of {} -> {r} vel {:?}", self.last.matched(), self.velocity.map(|v|(v.translation.vector.norm(), v.rotation.angle())));
-                return  r >= c.motion_min_inliers;
+            if search_last_frame(sensor, c, &self.last, &mut self.current, radius) >= c.motion_min_matches {
+                return self.current.refine_pose(sensor, &config.pose) >= c.motion_min_inliers;
             }
         }
         false
@@ -91,11 +88,8 @@ impl Tracker {
         let Some(keyframe) = self.reference.and_then(|id| map.keyframe(id)) else { return false };
         self.current.clear_sights();
         self.current.t_cam_world = self.last.t_cam_world;
-        let n=search_keyframe(c, keyframe, map, &mut self.current);
-        let r = self.current.refine_pose(sensor, &config.pose);
-        eprintln!("ref {n} {r}");
-        n >= c.reference_min_matches
-            && r >= c.motion_min_inliers
+        search_keyframe(c, keyframe, map, &mut self.current) >= c.reference_min_matches
+            && self.current.refine_pose(sensor, &config.pose) >= c.motion_min_inliers
     }
 
     /// Matches the local map and refines the pose with all of it. Returns whether the frame is tracked.
