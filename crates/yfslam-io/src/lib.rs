@@ -1,1 +1,18 @@
-//! yfslam-io
+//! Sequences and formats, in and out.
+//!
+//! ```text
+//! folder ──Sequence──► entries ──FrameStream──► RgbdFrame, or a FrameError for a frame that cannot be used
+//! preset, settings file or TOML ──load_camera──► Camera
+//! trajectory file ◄──► TrajectoryFile        points, pictures, text ──write_atomically──► files
+//! ```
+//!
+//! An [`Error`] ends what was asked for: it names the file, the value and the cure. A [`FrameError`] concerns one frame; the
+//! caller counts it and goes on.
+
+pub mod error;
+pub mod sequence;
+mod text;
+pub mod time;
+
+pub use error::{Error, Result};
+pub use sequence::{Sequence, SequenceOptions};
