@@ -9,10 +9,12 @@
 //! An [`Error`] ends what was asked for: it names the file, the value and the cure. A [`FrameError`] concerns one frame; the
 //! caller counts it and goes on.
 
+pub mod camera;
 pub mod error;
 pub mod sequence;
 mod text;
 pub mod time;
 
+pub use camera::{CameraSource, detect_camera, load_camera};
 pub use error::{Error, Result};
 pub use sequence::{Sequence, SequenceOptions};
