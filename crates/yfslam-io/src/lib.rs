@@ -10,11 +10,14 @@
 //! caller counts it and goes on.
 
 pub mod camera;
+pub mod decode;
 pub mod error;
 pub mod sequence;
+pub mod stream;
 mod text;
 pub mod time;
 
 pub use camera::{CameraSource, detect_camera, load_camera};
 pub use error::{Error, Result};
 pub use sequence::{Sequence, SequenceOptions};
+pub use stream::{FrameError, FrameFault, FrameStream};
