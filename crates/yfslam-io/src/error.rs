@@ -73,6 +73,24 @@ impl Error {
         Self::Read { path: path.into(), source, cure: cure.into() }
     }
 
+    pub(crate) fn write(path: &Path, source: io::Error) -> Self {
+        let cure = match source.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
+                "free some space or choose another disk"
+            }
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+                "choose a folder that this user may write to"
+            }
+            io::ErrorKind::IsADirectory => "name a file, not a folder",
+            io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
+                "a part of this path is a file; choose another folder"
+            }
+            io::ErrorKind::InvalidData => "nothing was written; please report this as a defect",
+            _ => "choose another path",
+        };
+        Self::Write { path: path.into(), source, cure: cure.into() }
+    }
+
     pub(crate) fn line(path: &Path, line: usize, problem: impl Into<String>, cure: impl Into<String>) -> Self {
         Self::Line { path: path.into(), line, problem: problem.into(), cure: cure.into() }
     }

@@ -3,7 +3,6 @@
 //! ```text
 //! folder ──Sequence──► entries ──FrameStream──► RgbdFrame, or a FrameError for a frame that cannot be used
 //! preset, settings file or TOML ──load_camera──► Camera
-//! trajectory file ◄──► TrajectoryFile        points, pictures, text ──write_atomically──► files
 //! ```
 //!
 //! An [`Error`] ends what was asked for: it names the file, the value and the cure. A [`FrameError`] concerns one frame; the
@@ -16,8 +15,10 @@ pub mod sequence;
 pub mod stream;
 mod text;
 pub mod time;
+pub mod write;
 
 pub use camera::{CameraSource, detect_camera, load_camera};
 pub use error::{Error, Result};
 pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};
+pub use write::write_atomically;
