@@ -9,10 +9,11 @@ pub mod lists;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use crate::ascending::keep_ascending;
 use crate::error::{Error, Result};
 use crate::text::read_text;
 use crate::time::{TimeMirror, format_stamp};
-use associate::{ascending, associate};
+use associate::associate;
 pub use info::{ColorDepthOffset, SequenceInfo};
 use lists::{ListedFile, color_is_second, parse_file_list, parse_pair_list};
 
@@ -165,7 +166,7 @@ fn from_associations(path: &Path) -> Result<(Vec<FrameEntry>, AssociationReport)
         depth_listed: listed,
         ..Default::default()
     };
-    let kept = keep_ascending(all, |e| e.timestamp_ns, path, &mut report)?;
+    let kept = in_order(all, |e| e.timestamp_ns, path, &mut report)?;
     let ascending = kept.len();
     let mut depth_seen = BTreeSet::new();
     let entries: Vec<_> = kept.into_iter().filter(|e| depth_seen.insert(e.depth_path.clone())).collect();
@@ -181,8 +182,8 @@ fn from_lists(folder: &Path, tolerance_ns: i64) -> Result<(Vec<FrameEntry>, Asso
     let color = parse_file_list(&read_text(&color_path)?, &color_path)?;
     let depth = parse_file_list(&read_text(&depth_path)?, &depth_path)?;
     let mut report = AssociationReport { color_listed: color.len(), depth_listed: depth.len(), ..Default::default() };
-    let color = keep_ascending(color, |f| f.stamp_ns, &color_path, &mut report)?;
-    let depth = keep_ascending(depth, |f| f.stamp_ns, &depth_path, &mut report)?;
+    let color = in_order(color, |f| f.stamp_ns, &color_path, &mut report)?;
+    let depth = in_order(depth, |f| f.stamp_ns, &depth_path, &mut report)?;
     let stamps = |files: &[ListedFile]| files.iter().map(|f| f.stamp_ns).collect::<Vec<_>>();
     let pairs = associate(&stamps(&color), &stamps(&depth), tolerance_ns);
     if pairs.is_empty() {
@@ -204,27 +205,20 @@ fn from_lists(folder: &Path, tolerance_ns: i64) -> Result<(Vec<FrameEntry>, Asso
     Ok((pairs.into_iter().map(|(c, d)| frame_entry(color[c].clone(), depth[d].clone())).collect(), report))
 }
 
-/// Drops what does not ascend in time and counts it.
-///
-/// A list of which most would go is not a recording with glitches but an unsorted file: refused.
-fn keep_ascending<T>(
+/// Refuses an empty list, drops what does not ascend in time and counts it.
+fn in_order<T>(
     items: Vec<T>,
-    stamp_ns: impl Fn(&T) -> i64,
+    stamp: impl Fn(&T) -> i64,
     path: &Path,
     report: &mut AssociationReport,
 ) -> Result<Vec<T>> {
     if items.is_empty() {
         return Err(Error::content(path, "lists no image", "record or unpack the sequence again"));
     }
-    let found = ascending(&items.iter().map(stamp_ns).collect::<Vec<_>>());
-    if found.backward > items.len() / 2 {
-        let problem = format!("{} of its {} stamps run backward", found.backward, items.len());
-        return Err(Error::content(path, problem, "sort the file by its first column"));
-    }
-    report.duplicates_skipped += found.duplicates;
-    report.backward_skipped += found.backward;
-    let mut kept = found.kept.into_iter().peekable();
-    Ok(items.into_iter().enumerate().filter(|(i, _)| kept.next_if_eq(i).is_some()).map(|(_, item)| item).collect())
+    let kept = keep_ascending(items, stamp, path)?;
+    report.duplicates_skipped += kept.duplicates;
+    report.backward_skipped += kept.backward;
+    Ok(kept.items)
 }
 
 fn frame_entry(color: ListedFile, depth: ListedFile) -> FrameEntry {
