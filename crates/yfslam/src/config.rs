@@ -5,6 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::dynamic::Method;
+use crate::dynamic::depth_group::Grouping;
+
 /// Field names and doc comments of a configuration section.
 pub type FieldDocs = &'static [(&'static str, &'static str)];
 
@@ -191,12 +194,52 @@ config_section! {
 }
 
 config_section! {
+    /// Keeping moving things out (YF-SLAM, section 3.3).
+    DynamicConfig {
+        /// `none` (ORB-SLAM2), `boxes` (all features in boxes dropped) or `yf` (the paper).
+        method: Method = Method::Yf,
+        /// How the largest depth group is found: `ransac` (the paper, seeded) or `exact` (deterministic search).
+        grouping: Grouping = Grouping::Exact,
+        /// Names of the classes that can move.
+        movable: Vec<String> = vec!["person".to_owned()],
+        /// Score at which a box opens a track, and counts for `boxes`. Source: demo threshold of YOLO-FastestV2.
+        open_score: f32 = 0.3,
+        /// Score at which a box keeps a track.
+        keep_score: f32 = 0.1,
+        /// Overlap (IoU) of a box with the place predicted by its track.
+        track_min_iou: f32 = 0.3,
+        /// Frames over which a track is carried without a box.
+        max_misses: usize = 10,
+        /// Half the depth of a body, m. Source: NGD-SLAM's 0.33.
+        group_half_width_m: f32 = 0.33,
+        /// How much nearer than the body a limb may reach, m.
+        reach_m: f32 = 0.3,
+        /// Depth between a body and what is in front of it, m. Source: NGD-SLAM's gap between clusters.
+        group_gap_m: f32 = 0.1,
+        /// Share of a box's pixels that makes a body.
+        body_min_share: f32 = 0.15,
+        /// How far a body moves towards or from the camera between frames, m.
+        max_depth_step_m: f32 = 0.15,
+        /// Share of its size by which a box is grown on each side: limbs stick out.
+        margin: f32 = 0.1,
+        /// Distance from the body within which a corner sees its outline, px at the finest level.
+        edge_px: f32 = 6.0,
+        /// Features that must stay trusted; else the least certain boxes are given up.
+        min_trusted: usize = 60,
+        /// Seed of the random draws.
+        seed: u64 = 0,
+    }
+}
+
+config_section! {
     /// The whole configuration.
     Config {
         /// Feature extraction.
         features: FeatureConfig = FeatureConfig::default(),
         /// Sensor noise.
         depth: DepthConfig = DepthConfig::default(),
+        /// Dynamic filter.
+        dynamic: DynamicConfig = DynamicConfig::default(),
         /// Tracking.
         tracking: TrackingConfig = TrackingConfig::default(),
         /// Keyframe policy.

@@ -4,6 +4,8 @@
 pub mod camera;
 pub mod config;
 pub mod detection;
+mod detector_thread;
+pub mod dynamic;
 pub mod features;
 pub mod frame;
 pub mod geometry;
@@ -19,4 +21,4 @@ pub use camera::Camera;
 pub use config::Config;
 pub use detection::{BoundingBox, Detection, Detector, DetectorError};
 pub use frame::RgbdFrame;
-pub use system::{Slam, Tracked};
+pub use system::{SetupError, Slam, Tracked};

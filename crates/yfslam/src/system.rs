@@ -4,6 +4,9 @@ use std::time::{Duration, Instant};
 
 use crate::camera::Camera;
 use crate::config::Config;
+use crate::detection::{Detection, Detector};
+use crate::detector_thread::DetectorThread;
+use crate::dynamic::{DynamicFilter, Method, Region};
 use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
@@ -11,7 +14,7 @@ use crate::image::{GrayImage, gray_from_rgb};
 use crate::map::{KeyFrameId, Map};
 use crate::mapping::Mapper;
 use crate::sensor::SensorModel;
-use crate::tracking::{Tracker, TrackingState};
+use crate::tracking::{TrackedFrame, Tracker, TrackingState};
 
 /// What became of one frame.
 #[derive(Clone, Debug)]
@@ -30,11 +33,29 @@ pub struct Tracked {
     pub times: StageTimes,
 }
 
+/// Why a system could not be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupError {
+    /// A movable class that the detector does not know.
+    #[error("dynamic.movable names the class '{name}', which the detector does not know; it knows: {known}")]
+    UnknownClass {
+        /// The class asked for.
+        name: String,
+        /// The classes the detector has.
+        known: String,
+    },
+    /// A thread could not be started.
+    #[error("the detector's thread could not be started: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
 /// Wall time of the stages of one frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StageTimes {
     /// Grey image and feature extraction.
     pub features: Duration,
+    /// Waiting for the detector, which ran beside feature extraction.
+    pub detector_wait: Duration,
     /// Dynamic filter, both doors.
     pub dynamic: Duration,
     /// Pose from last frame and local map.
@@ -63,13 +84,39 @@ pub struct Slam {
     map: Map,
     state: TrackingState,
     anchors: Vec<Anchor>,
+    filter: DynamicFilter,
+    detector: Option<DetectorThread>,
+    /// Indices of the classes that can move.
+    movable_classes: Vec<usize>,
+    movable: Vec<Detection>,
+    detector_failures: usize,
 }
 
 impl Slam {
-    /// A system without a map, for one camera.
-    pub fn new(config: Config, camera: &Camera) -> Self {
+    /// A system without a map, for one camera. Without a detector, boxes can still come with the frames.
+    ///
+    /// # Errors
+    /// If the detector does not know a movable class of the configuration, or its thread cannot be started.
+    pub fn new(config: Config, camera: &Camera, detector: Option<Box<dyn Detector>>) -> Result<Self, SetupError> {
         let extractor = OrbExtractor::new(&config.features);
-        Self {
+        // A method that asks for no boxes needs no detector.
+        let detector = detector.filter(|_| config.dynamic.method != Method::None);
+        let mut movable_classes = Vec::new();
+        if let Some(detector) = &detector {
+            let known = detector.class_names();
+            for name in &config.dynamic.movable {
+                movable_classes.push(known.iter().position(|k| k == name).ok_or_else(|| SetupError::UnknownClass {
+                    name: name.clone(),
+                    known: known.join(", "),
+                })?);
+            }
+        }
+        Ok(Self {
+            filter: DynamicFilter::new(config.dynamic.seed),
+            detector: detector.map(DetectorThread::spawn).transpose()?,
+            movable_classes,
+            movable: Vec::new(),
+            detector_failures: 0,
             sensor: SensorModel::new(camera, &config, extractor.scale_factors()),
             config,
             extractor,
@@ -80,15 +127,21 @@ impl Slam {
             map: Map::default(),
             state: TrackingState::NotInitialized,
             anchors: Vec::new(),
-        }
+        })
     }
 
     /// Takes one frame through all stages.
     pub fn track(&mut self, frame: &RgbdFrame) -> Tracked {
         let mut times = StageTimes::default();
         let mut clock = Stopwatch::start();
+        let detecting = self.start_detector(frame);
         self.extract(frame);
         times.features = clock.lap();
+        self.collect_boxes(frame, detecting);
+        times.detector_wait = clock.lap();
+        let features = &mut self.tracker.current.features;
+        self.filter.before_pose(&self.config.dynamic, &self.movable, &frame.depth, features);
+        times.dynamic = clock.lap();
         let tracked = match self.state {
             TrackingState::NotInitialized => self.has_enough_to_start(),
             TrackingState::Tracking | TrackingState::Lost => {
@@ -122,6 +175,33 @@ impl Slam {
             is_keyframe,
             inliers: self.tracker.inliers,
             times,
+        }
+    }
+
+    /// Hands the image to the detector unless the frame brings its boxes along. Returns whether boxes are to be waited for.
+    fn start_detector(&mut self, frame: &RgbdFrame) -> bool {
+        match &mut self.detector {
+            Some(detector) if frame.detections.is_none() => {
+                detector.start(&frame.color);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// This frame's boxes of movable objects. A frame the detector fails on counts as one without boxes: tracks carry it.
+    fn collect_boxes(&mut self, frame: &RgbdFrame, detecting: bool) {
+        self.movable.clear();
+        if let Some(known) = &frame.detections {
+            self.movable.extend_from_slice(known);
+        } else if let (true, Some(detector)) = (detecting, &mut self.detector) {
+            match detector.finish() {
+                Ok(boxes) => self.movable.extend(boxes.iter().filter(|d| self.movable_classes.contains(&d.class))),
+                Err(error) => {
+                    tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
+                    self.detector_failures += 1;
+                }
+            }
         }
     }
 
@@ -159,6 +239,26 @@ impl Slam {
                 Some((a.timestamp_ns, t_cam_world.inverse()))
             })
             .collect()
+    }
+
+    /// Frames on which the detector failed.
+    pub fn detector_failures(&self) -> usize {
+        self.detector_failures
+    }
+
+    /// The last frame: features with their trust, matches, pose.
+    pub fn last_frame(&self) -> &TrackedFrame {
+        &self.tracker.current
+    }
+
+    /// The boxes of movable objects in the last frame, at any score.
+    pub fn last_boxes(&self) -> &[Detection] {
+        &self.movable
+    }
+
+    /// The parts of the last frame that were found to move.
+    pub fn moving_regions(&self) -> &[Region] {
+        self.filter.regions()
     }
 
     /// The map.
