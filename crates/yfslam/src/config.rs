@@ -252,3 +252,79 @@ config_section! {
         bundle: BundleConfig = BundleConfig::default(),
     }
 }
+
+/// Sections of the configuration in the order of [`Config`], with the docs of their keys.
+const SECTIONS: &[(&str, &str, FieldDocs)] = &[
+    ("features", FeatureConfig::ABOUT, FeatureConfig::FIELDS),
+    ("depth", DepthConfig::ABOUT, DepthConfig::FIELDS),
+    ("dynamic", DynamicConfig::ABOUT, DynamicConfig::FIELDS),
+    ("tracking", TrackingConfig::ABOUT, TrackingConfig::FIELDS),
+    ("keyframes", KeyframeConfig::ABOUT, KeyframeConfig::FIELDS),
+    ("mapping", MappingConfig::ABOUT, MappingConfig::FIELDS),
+    ("pose", PoseOptimizerConfig::ABOUT, PoseOptimizerConfig::FIELDS),
+    ("bundle", BundleConfig::ABOUT, BundleConfig::FIELDS),
+];
+
+impl Config {
+    /// Reads a configuration; keys that are left out keep their defaults, unknown keys are refused.
+    ///
+    /// # Errors
+    /// With line, key and the keys that exist, if the text is not TOML or holds an unknown key or a value of the wrong type.
+    pub fn from_toml(text: &str) -> Result<Self, toml::de::Error> {
+        toml::from_str(text)
+    }
+
+    /// The configuration as TOML, each key under a comment with its meaning, unit and source.
+    ///
+    /// # Errors
+    /// If a value has no TOML form, such as a seed beyond 2^63.
+    pub fn to_commented_toml(&self) -> Result<String, toml::ser::Error> {
+        let table = toml::Table::try_from(self)?;
+        let mut text = String::new();
+        for (name, about, fields) in SECTIONS {
+            let Some(section) = table.get(*name) else { continue };
+            push_comment(&mut text, about);
+            text += &format!("[{name}]\n");
+            for (key, doc) in *fields {
+                if let Some(value) = section.get(key) {
+                    push_comment(&mut text, doc);
+                    text += &format!("{key} = {value}\n");
+                }
+            }
+            text.push('\n');
+        }
+        Ok(text)
+    }
+}
+
+fn push_comment(text: &mut String, doc: &str) {
+    for line in doc.lines() {
+        text.push('#');
+        text.push_str(line);
+        text.push('\n');
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_printed_configuration_reads_back_and_explains_every_key() {
+        let text = Config::default().to_commented_toml().unwrap();
+        assert_eq!(Config::from_toml(&text).unwrap(), Config::default());
+        let lines: Vec<&str> = text.lines().collect();
+        let keys = lines.iter().enumerate().filter(|(_, l)| l.contains(" = ") && !l.starts_with('#'));
+        assert!(keys.clone().count() > 60);
+        for (i, key) in keys {
+            assert!(i > 0 && lines[i - 1].starts_with("# "), "no comment above: {key}");
+        }
+        assert_eq!(SECTIONS.len(), Config::FIELDS.len(), "a section is missing from SECTIONS");
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_by_name() {
+        let error = Config::from_toml("[tracking]\nlocal_raduis_px = 4.0\n").unwrap_err().to_string();
+        assert!(error.contains("local_raduis_px") && error.contains("local_radius_px"), "{error}");
+    }
+}

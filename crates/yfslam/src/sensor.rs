@@ -38,10 +38,7 @@ impl SensorModel {
             pinhole,
             bounds: ImageBounds::of(camera),
             scale_factors: scale_factors.to_vec(),
-            weights_px: scale_factors
-                .iter()
-                .map(|s| (config.depth.corner_sigma_px * f64::from(*s)).powi(-2))
-                .collect(),
+            weights_px: scale_factors.iter().map(|s| (config.depth.corner_sigma_px * f64::from(*s)).powi(-2)).collect(),
             weight_disparity: sigma_disparity.powi(-2),
             close_limit_m: config.depth.close_limit_baselines * camera.bf / camera.fx,
             max_depth_m: config.depth.max_m,

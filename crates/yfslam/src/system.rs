@@ -105,10 +105,12 @@ impl Slam {
         if let Some(detector) = &detector {
             let known = detector.class_names();
             for name in &config.dynamic.movable {
-                movable_classes.push(known.iter().position(|k| k == name).ok_or_else(|| SetupError::UnknownClass {
-                    name: name.clone(),
-                    known: known.join(", "),
-                })?);
+                movable_classes.push(
+                    known
+                        .iter()
+                        .position(|k| k == name)
+                        .ok_or_else(|| SetupError::UnknownClass { name: name.clone(), known: known.join(", ") })?,
+                );
             }
         }
         Ok(Self {
@@ -219,7 +221,8 @@ impl Slam {
     fn has_enough_to_start(&self) -> bool {
         let features = &self.tracker.current.features.features;
         let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
-        features.len() >= self.config.tracking.init_min_features && with_depth >= self.config.tracking.init_min_landmarks
+        features.len() >= self.config.tracking.init_min_features
+            && with_depth >= self.config.tracking.init_min_landmarks
     }
 
     fn note_anchor(&mut self, timestamp_ns: i64) {

@@ -62,7 +62,7 @@ pub fn largest_ransac(sorted: &[f32], width_m: f32, rng: &mut Pcg32) -> Option<D
     let (mut draws, mut wanted) = (0.0, RANSAC_MAX_DRAWS);
     while draws < wanted {
         draws += 1.0;
-        let mut pick = || sorted[(u64::from(rng.next_u32()) * n as u64 >> 32) as usize];
+        let mut pick = || sorted[((u64::from(rng.next_u32()) * n as u64) >> 32) as usize];
         let (a, b) = (pick(), pick());
         if (a - b).abs() > half {
             continue;
@@ -74,7 +74,8 @@ pub fn largest_ransac(sorted: &[f32], width_m: f32, rng: &mut Pcg32) -> Option<D
         if best.is_none_or(|b| members > b.members) {
             best = Some(DepthGroup { near_m: sorted[start], far_m: sorted[end - 1], members });
             let ratio = members as f64 / n as f64;
-            wanted = ((1.0 - RANSAC_CONFIDENCE).ln() / (1.0 - ratio * ratio).max(1e-12).ln()).clamp(1.0, RANSAC_MAX_DRAWS);
+            wanted =
+                ((1.0 - RANSAC_CONFIDENCE).ln() / (1.0 - ratio * ratio).max(1e-12).ln()).clamp(1.0, RANSAC_MAX_DRAWS);
         }
     }
     best.or_else(|| largest_exact(sorted, width_m))

@@ -63,7 +63,10 @@ impl DepthGroups {
                 bbox: grown(&track.bbox, config.margin),
                 score: track.score,
                 misses: track.misses,
-                depth_m: Some([center - config.group_half_width_m - config.reach_m, center + config.group_half_width_m]),
+                depth_m: Some([
+                    center - config.group_half_width_m - config.reach_m,
+                    center + config.group_half_width_m,
+                ]),
             });
             true
         });
@@ -72,9 +75,8 @@ impl DepthGroups {
     /// Sorted depths of the features and of a grid of pixels inside a box.
     fn collect(&mut self, bbox: &BoundingBox, depth: &DepthImage, features: &FrameFeatures) {
         self.feature_depths.clear();
-        self.feature_depths.extend(
-            features.features.iter().filter(|f| bbox.contains(f.raw[0], f.raw[1])).filter_map(|f| f.depth_m),
-        );
+        self.feature_depths
+            .extend(features.features.iter().filter(|f| bbox.contains(f.raw[0], f.raw[1])).filter_map(|f| f.depth_m));
         self.feature_depths.sort_unstable_by(f32::total_cmp);
         self.pixel_depths.clear();
         let (x0, y0) = (bbox.x_min.max(0.0) as usize, bbox.y_min.max(0.0) as usize);
@@ -95,7 +97,8 @@ impl DepthGroups {
         let width = 2.0 * config.group_half_width_m;
         if let Some(z) = track.depth_m {
             let step = config.max_depth_step_m * (1 + track.misses) as f32;
-            let near = within(&self.pixel_depths, z - config.group_half_width_m - step, z + config.group_half_width_m + step);
+            let near =
+                within(&self.pixel_depths, z - config.group_half_width_m - step, z + config.group_half_width_m + step);
             let group = largest_exact(near, width);
             if let Some(g) = group
                 && g.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32

@@ -129,7 +129,9 @@ impl FrameFeatures {
         mut visit: impl FnMut(usize),
     ) {
         let b = &self.bounds;
-        if self.start.is_empty() || !(u + radius >= b.u_min && u - radius < b.u_max && v + radius >= b.v_min && v - radius < b.v_max) {
+        if self.start.is_empty()
+            || !(u + radius >= b.u_min && u - radius < b.u_max && v + radius >= b.v_min && v - radius < b.v_max)
+        {
             return;
         }
         let (c0, r0) = self.cell(u - radius, v - radius);

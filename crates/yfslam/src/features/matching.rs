@@ -27,7 +27,8 @@ impl RotationHistogram {
         }
         let mut order: [usize; BINS] = std::array::from_fn(|i| i);
         order.sort_by_key(|&bin| std::cmp::Reverse(counts[bin]));
-        let dominant = order[..3].iter().filter(|&&bin| counts[bin] * 10 >= counts[order[0]]).fold(0u32, |m, &b| m | 1 << b);
+        let dominant =
+            order[..3].iter().filter(|&&bin| counts[bin] * 10 >= counts[order[0]]).fold(0u32, |m, &b| m | 1 << b);
         for &(bin, payload) in &self.entries {
             if dominant & (1 << bin) == 0 {
                 visit(payload);

@@ -5,8 +5,8 @@
 mod brief;
 mod distribute;
 mod fast;
-pub mod matching;
 mod frame;
+pub mod matching;
 mod orb;
 mod orientation;
 mod pattern;

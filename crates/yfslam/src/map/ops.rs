@@ -124,7 +124,9 @@ impl Map {
             descriptors.push(keyframe.features.descriptors[f as usize]);
         }
         // The reference may have been culled; remove_observation then names another.
-        let (Some(reference), Some(feature)) = (self.keyframes.get(l.reference), l.feature_in(l.reference)) else { return };
+        let (Some(reference), Some(feature)) = (self.keyframes.get(l.reference), l.feature_in(l.reference)) else {
+            return;
+        };
         let octave = usize::from(reference.features.features[feature].octave);
         let center = reference.t_cam_world.inverse_transform_point(&Point3::origin());
         let distance = (l.position - center).norm();
@@ -187,7 +189,8 @@ impl Map {
             .filter(|other| *other != keyframe)
             .collect();
         seen.sort_unstable();
-        let mut counts: Vec<(KeyFrameId, usize)> = seen.chunk_by(|a, b| a == b).map(|run| (run[0], run.len())).collect();
+        let mut counts: Vec<(KeyFrameId, usize)> =
+            seen.chunk_by(|a, b| a == b).map(|run| (run[0], run.len())).collect();
         counts.sort_by_key(|&(id, count)| (std::cmp::Reverse(count), id));
         // The best one always counts, so that the graph stays connected.
         let keep = counts.partition_point(|&(_, count)| count >= COVISIBLE_MIN_SHARED).max(1).min(counts.len());

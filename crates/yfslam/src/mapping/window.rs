@@ -43,7 +43,8 @@ impl Window {
 
     /// Copies the whole map; all keyframes but the first are adjusted.
     pub fn whole(sensor: &SensorModel, map: &Map) -> Self {
-        let mut keyframes: Vec<KeyFrameId> = map.keyframes().filter(|(_, k)| k.sequence > 0).map(|(id, _)| id).collect();
+        let mut keyframes: Vec<KeyFrameId> =
+            map.keyframes().filter(|(_, k)| k.sequence > 0).map(|(id, _)| id).collect();
         let free_poses = keyframes.len();
         keyframes.extend(map.keyframes().filter(|(_, k)| k.sequence == 0).map(|(id, _)| id));
         let landmarks = map.landmarks().map(|(id, _)| id).collect();

@@ -69,10 +69,8 @@ impl BundleProblem {
                 lambda *= 10.0;
                 continue;
             };
-            let (poses, points) = (
-                std::mem::replace(&mut self.poses, candidate.0),
-                std::mem::replace(&mut self.points, candidate.1),
-            );
+            let (poses, points) =
+                (std::mem::replace(&mut self.poses, candidate.0), std::mem::replace(&mut self.points, candidate.1));
             let new_cost = self.cost(robust);
             summary.iterations += 1;
             // A comparison with NaN is false: a step into nonsense is never kept.
@@ -287,7 +285,9 @@ mod tests {
     fn scene(noise: f64) -> (BundleProblem, BundleProblem) {
         let camera = Pinhole { fx: 520.0, fy: 520.0, cx: 320.0, cy: 240.0, bf: 40.0 };
         let poses: Vec<Pose> = (0..6)
-            .map(|i| se3_exp(&Vector6::new(0.1 * f64::from(i), 0.02 * f64::from(i), 0.0, 0.0, 0.03 * f64::from(i), 0.01)))
+            .map(|i| {
+                se3_exp(&Vector6::new(0.1 * f64::from(i), 0.02 * f64::from(i), 0.0, 0.0, 0.03 * f64::from(i), 0.01))
+            })
             .collect();
         let mut points = Vec::new();
         let mut observations = Vec::new();

@@ -2,11 +2,11 @@
 
 use nalgebra::Point3;
 
+use crate::config::PoseOptimizerConfig;
 use crate::features::FrameFeatures;
 use crate::geometry::Pose;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::optimize::pose_only::{PoseObservation, optimize_pose};
-use crate::config::PoseOptimizerConfig;
 use crate::sensor::SensorModel;
 
 /// A point that a feature is matched to.
@@ -120,7 +120,8 @@ impl TrackedFrame {
 
     /// Ties the frame to a keyframe, so that it moves along when the map is corrected.
     pub fn tie_to(&mut self, reference: KeyFrameId, map: &Map) {
-        self.reference =
-            map.keyframe_pose(reference).map(|t_reference_world| (reference, self.t_cam_world * t_reference_world.inverse()));
+        self.reference = map
+            .keyframe_pose(reference)
+            .map(|t_reference_world| (reference, self.t_cam_world * t_reference_world.inverse()));
     }
 }

@@ -61,8 +61,7 @@ impl Tracker {
 
     /// A first pose from the last frame, else from the reference keyframe. Returns whether one was found.
     pub fn estimate(&mut self, sensor: &SensorModel, config: &Config, map: &Map) -> bool {
-        (self.velocity.is_some() && self.track_motion(sensor, config, map))
-            || self.track_reference(sensor, config, map)
+        (self.velocity.is_some() && self.track_motion(sensor, config, map)) || self.track_reference(sensor, config, map)
     }
 
     /// Constant-velocity model: the points of the last frame are sought around their projection.
@@ -142,11 +141,8 @@ impl Tracker {
     /// Whether the current frame should become a keyframe.
     pub fn wants_keyframe(&self, sensor: &SensorModel, config: &Config, map: &Map) -> bool {
         let Some(reference) = self.reference else { return true };
-        let summary = FrameSummary {
-            inliers: self.inliers,
-            frames_since: self.frames_since_keyframe,
-            fps: sensor.camera.fps,
-        };
+        let summary =
+            FrameSummary { inliers: self.inliers, frames_since: self.frames_since_keyframe, fps: sensor.camera.fps };
         is_keyframe_wanted(&config.keyframes, &config.tracking, sensor, map, reference, &self.current, summary)
     }
 
@@ -158,8 +154,8 @@ impl Tracker {
         self.current.t_cam_world = k.t_cam_world;
         self.current.reference = Some((keyframe, Pose::identity()));
         for (sight, landmark) in self.current.sights.iter_mut().zip(&k.landmarks) {
-            *sight = landmark
-                .and_then(|id| Some(Sight { landmark: Some(id), point_world: map.landmark(id)?.position }));
+            *sight =
+                landmark.and_then(|id| Some(Sight { landmark: Some(id), point_world: map.landmark(id)?.position }));
         }
     }
 
