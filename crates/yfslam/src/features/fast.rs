@@ -7,26 +7,6 @@ use fearless_simd::{Level, dispatch, prelude::*};
 use crate::image::kernels::{load, store};
 use crate::image::{LANES, Plane};
 
-/// The Bresenham circle of radius 3, px: columns and rows, clockwise from twelve o'clock.
-const CIRCLE: [(isize, isize); 16] = [
-    (0, -3),
-    (1, -3),
-    (2, -2),
-    (3, -1),
-    (3, 0),
-    (3, 1),
-    (2, 2),
-    (1, 3),
-    (0, 3),
-    (-1, 3),
-    (-2, 2),
-    (-3, 1),
-    (-3, 0),
-    (-3, -1),
-    (-2, -2),
-    (-1, -3),
-];
-
 /// A corner in a pyramid level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Corner {
@@ -38,55 +18,60 @@ pub(crate) struct Corner {
     pub score: u8,
 }
 
-/// Replaces `corners` by the pixels at least `border` (≥ 4) px inside the image whose score exceeds `threshold` and all
-/// eight neighbours (of equal ones the first stays), row by row.
+/// Corners of one image, row by row.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Corners {
+    /// Those whose score exceeds the higher threshold.
+    pub strong: Vec<Corner>,
+    /// Those whose score exceeds the lower threshold only.
+    pub weak: Vec<Corner>,
+}
+
+/// Where and how corners are sought.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Search {
+    /// Threshold of strong corners, grey levels.
+    pub strong: u8,
+    /// Threshold of weak corners, grey levels, at most `strong`.
+    pub weak: u8,
+    /// Distance from the image's edge within which no corner is sought, at least 4 px.
+    pub border: usize,
+}
+
+/// Replaces `corners` by the pixels whose score exceeds a threshold and all eight neighbours (of equal ones the first stays).
 ///
 /// `scores` is a buffer for three rows.
-pub(crate) fn detect(
-    level: Level,
-    image: &Plane,
-    threshold: u8,
-    border: usize,
-    scores: &mut [Vec<u8>; 3],
-    corners: &mut Vec<Corner>,
-) {
-    corners.clear();
+pub(crate) fn detect(level: Level, image: &Plane, search: Search, scores: &mut [Vec<u8>; 3], corners: &mut Corners) {
+    corners.strong.clear();
+    corners.weak.clear();
     // Larger images than coordinates can tell are cut off.
     let (width, height) = (image.width().min(u16::MAX.into()), image.height().min(u16::MAX.into()));
-    if width <= 2 * border || height <= 2 * border {
+    if width <= 2 * search.border || height <= 2 * search.border {
         return;
     }
     for row in scores.iter_mut() {
         row.resize(image.stride() + LANES, 0);
     }
-    let area = Area { left: border, top: border, width: width - 2 * border, height: height - 2 * border };
-    dispatch!(level, simd => detect_rows(simd, image, threshold, area, scores, corners));
+    let size = [width - 2 * search.border, height - 2 * search.border];
+    dispatch!(level, simd => detect_rows(simd, image, search, size, scores, corners));
 }
 
-/// The rectangle in which corners are sought; scores are needed one pixel around it.
-#[derive(Clone, Copy)]
-struct Area {
-    left: usize,
-    top: usize,
-    width: usize,
-    height: usize,
-}
-
+/// Scores row after row, one pixel more than sought on each side, and looks for maxima in the last three.
 #[inline(always)]
 fn detect_rows<S: Simd>(
     simd: S,
     image: &Plane,
-    threshold: u8,
-    area: Area,
+    search: Search,
+    [width, height]: [usize; 2],
     scores: &mut [Vec<u8>; 3],
-    corners: &mut Vec<Corner>,
+    corners: &mut Corners,
 ) {
-    for i in 0..area.height + 2 {
-        let start = (area.top + i - 1) * image.stride() + area.left - 1;
-        score_row(simd, image, start, area.width + 2, threshold, &mut scores[i % 3]);
+    for i in 0..height + 2 {
+        let start = (search.border + i - 1) * image.stride() + search.border - 1;
+        score_row(simd, image, start, width + 2, search.weak, &mut scores[i % 3]);
         if i >= 2 {
-            let rows = [&scores[(i - 2) % 3], &scores[(i - 1) % 3], &scores[i % 3]].map(|row| &row[..]);
-            emit_maxima(simd, rows, area, area.top + i - 2, corners);
+            let rows = [&scores[(i - 2) % 3][..], &scores[(i - 1) % 3][..], &scores[i % 3][..]];
+            emit_maxima(simd, rows, width, search, search.border + i - 2, corners);
         }
     }
 }
@@ -94,48 +79,68 @@ fn detect_rows<S: Simd>(
 /// Scores of the `len` pixels from `image.data()[start]` on; 0 where the score does not exceed `threshold`.
 #[inline(always)]
 fn score_row<S: Simd>(simd: S, image: &Plane, start: usize, len: usize, threshold: u8, scores: &mut [u8]) {
-    let len = len.next_multiple_of(S::u8s::LEN);
-    let centre = &image.data()[start..start + len];
-    let circle = CIRCLE.map(|(dx, dy)| {
-        let start = start.wrapping_add_signed(dy * image.stride() as isize + dx);
-        &image.data()[start..start + len]
-    });
-    let scores = &mut scores[..len];
-    let none = S::u8s::splat(simd, threshold);
-    let zero = S::u8s::splat(simd, 0);
-    for x in (0..len).step_by(S::u8s::LEN) {
-        let c = load(simd, centre, x);
-        // Nine circle pixels in a row cover two neighbouring compass points.
-        let n = load(simd, circle[0], x);
-        let e = load(simd, circle[4], x);
-        let s = load(simd, circle[8], x);
-        let w = load(simd, circle[12], x);
-        let bright = n.max(s).min(e.max(w)).saturating_sub(c).simd_gt(none).any_true();
-        let dark = c.saturating_sub(n.min(s).max(e.min(w))).simd_gt(none).any_true();
-        let mut score = zero;
-        if bright || dark {
-            let mut ring = [c; 16];
-            for i in 0..16 {
-                ring[i] = load(simd, circle[i], x);
-            }
-            if bright {
-                let mut diff = ring;
-                for i in 0..16 {
-                    diff[i] = ring[i].saturating_sub(c);
-                }
-                score = best_arc::<S>(diff);
-            }
-            if dark {
-                let mut diff = ring;
-                for i in 0..16 {
-                    diff[i] = c.saturating_sub(ring[i]);
-                }
-                score = score.max(best_arc::<S>(diff));
-            }
-            score = score.simd_gt(none).select(score, zero);
-        }
-        store::<S>(scores, x, score);
+    let lanes = S::u8s::LEN;
+    let len = len.next_multiple_of(lanes);
+    let mut rows = [&[][..]; 7];
+    for (i, row) in rows.iter_mut().enumerate() {
+        let start = start + i * image.stride() - 3 * image.stride() - 3;
+        *row = &image.data()[start..start + len + 6];
     }
+    let scores = &mut scores[..len];
+    let zero = S::u8s::splat(simd, 0);
+    let none = S::u8s::splat(simd, threshold);
+    for x in (0..len).step_by(lanes) {
+        // Windows of known length spare the bounds checks below.
+        let mut window = rows;
+        for i in 0..7 {
+            window[i] = &rows[i][x..x + lanes + 6];
+        }
+        let centre = load(simd, window[3], 3);
+        // Nine circle pixels in a row cover two neighbouring compass points.
+        let [n, e] = [load(simd, window[0], 3), load(simd, window[3], 6)];
+        let [s, w] = [load(simd, window[6], 3), load(simd, window[3], 0)];
+        let bright = n.max(s).min(e.max(w)).saturating_sub(centre).simd_gt(none).any_true();
+        let dark = centre.saturating_sub(n.min(s).max(e.min(w))).simd_gt(none).any_true();
+        let mut score = zero;
+        if bright {
+            let mut differences = circle(simd, &window);
+            for i in 0..16 {
+                differences[i] = differences[i].saturating_sub(centre);
+            }
+            score = best_arc::<S>(differences);
+        }
+        if dark {
+            let mut differences = circle(simd, &window);
+            for i in 0..16 {
+                differences[i] = centre.saturating_sub(differences[i]);
+            }
+            score = score.max(best_arc::<S>(differences));
+        }
+        store::<S>(scores, x, score.simd_gt(none).select(score, zero));
+    }
+}
+
+/// The pixels on the circles around the centres from `window[3][3]` on, clockwise from twelve o'clock.
+#[inline(always)]
+fn circle<S: Simd>(simd: S, window: &[&[u8]; 7]) -> [S::u8s; 16] {
+    [
+        load(simd, window[0], 3),
+        load(simd, window[0], 4),
+        load(simd, window[1], 5),
+        load(simd, window[2], 6),
+        load(simd, window[3], 6),
+        load(simd, window[4], 6),
+        load(simd, window[5], 5),
+        load(simd, window[6], 4),
+        load(simd, window[6], 3),
+        load(simd, window[6], 2),
+        load(simd, window[5], 1),
+        load(simd, window[4], 0),
+        load(simd, window[3], 0),
+        load(simd, window[2], 0),
+        load(simd, window[1], 1),
+        load(simd, window[0], 2),
+    ]
 }
 
 /// Over all arcs of nine in a circle of 16, the largest of the smallest values.
@@ -151,39 +156,37 @@ fn best_arc<S: Simd>(v: [S::u8s; 16]) -> S::u8s {
     for i in 0..8 {
         four[i] = two[i].min(two[(i + 1) % 8]);
     }
-    let mut best = v[0];
+    let mut nine = four;
     for i in 0..8 {
-        let eight = four[i].min(four[(i + 2) % 8]);
-        let nine = eight.min(v[2 * i].max(v[(2 * i + 9) % 16]));
-        best = if i == 0 { nine } else { best.max(nine) };
+        nine[i] = four[i].min(four[(i + 2) % 8]).min(v[2 * i].max(v[(2 * i + 9) % 16]));
     }
-    best
+    let [a, b, c, d, e, f, g, h] = nine;
+    a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)))
 }
 
-/// Appends the local maxima of the middle one of three rows of scores, which is row `y` of the image.
+/// Appends the local maxima among the inner `width` scores of the middle one of three rows, which is row `y` of the image.
 #[inline(always)]
-fn emit_maxima<S: Simd>(simd: S, rows: [&[u8]; 3], area: Area, y: usize, corners: &mut Vec<Corner>) {
+fn emit_maxima<S: Simd>(simd: S, rows: [&[u8]; 3], width: usize, search: Search, y: usize, corners: &mut Corners) {
     let [above, row, below] = rows;
-    for x in (0..area.width).step_by(S::u8s::LEN) {
+    let row_maximum = |row: &[u8], x: usize| load(simd, row, x).max(load(simd, row, x + 1)).max(load(simd, row, x + 2));
+    for x in (0..width).step_by(S::u8s::LEN) {
         let score = load(simd, row, x + 1);
         if score.simd_gt(S::u8s::splat(simd, 0)).all_false() {
             continue;
         }
-        let before =
-            load(simd, above, x).max(load(simd, above, x + 1)).max(load(simd, above, x + 2)).max(load(simd, row, x));
-        let after = load(simd, below, x).max(load(simd, below, x + 1)).max(load(simd, below, x + 2)).max(load(
-            simd,
-            row,
-            x + 2,
-        ));
+        let before = row_maximum(above, x).max(load(simd, row, x));
+        let after = row_maximum(below, x).max(load(simd, row, x + 2));
         let mut maxima = (score.simd_gt(before) & score.simd_ge(after)).to_bitmask();
-        if area.width - x < S::u8s::LEN {
-            maxima &= (1 << (area.width - x)) - 1;
+        if width - x < S::u8s::LEN {
+            maxima &= (1 << (width - x)) - 1;
         }
-        while maxima != 0 {
-            let x = x + maxima.trailing_zeros() as usize;
-            corners.push(Corner { x: (area.left + x) as u16, y: y as u16, score: row[x + 1] });
-            maxima &= maxima - 1;
+        let strong = score.simd_gt(S::u8s::splat(simd, search.strong)).to_bitmask();
+        for (mut maxima, list) in [(maxima & strong, &mut corners.strong), (maxima & !strong, &mut corners.weak)] {
+            while maxima != 0 {
+                let x = x + maxima.trailing_zeros() as usize;
+                list.push(Corner { x: (search.border + x) as u16, y: y as u16, score: row[x + 1] });
+                maxima &= maxima - 1;
+            }
         }
     }
 }
@@ -195,6 +198,26 @@ mod tests {
     use super::*;
     use crate::image::kernels::tests::levels;
     use crate::image::plane::tests::images;
+
+    /// The Bresenham circle of radius 3, px: columns and rows, clockwise from twelve o'clock.
+    const CIRCLE: [(isize, isize); 16] = [
+        (0, -3),
+        (1, -3),
+        (2, -2),
+        (3, -1),
+        (3, 0),
+        (3, 1),
+        (2, 2),
+        (1, 3),
+        (0, 3),
+        (-1, 3),
+        (-2, 2),
+        (-3, 1),
+        (-3, 0),
+        (-3, -1),
+        (-2, -2),
+        (-1, -3),
+    ];
 
     /// The corner score by its definition.
     fn score(image: &Plane, x: usize, y: usize) -> u8 {
@@ -224,13 +247,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_level_agrees_with_the_scalar_twin(image in images(0..120), threshold in 0u8..60, border in 4usize..20) {
+        fn every_level_agrees_with_the_scalar_twin(image in images(0..120), weak in 0u8..60, more in 0u8..60, border in 4usize..20) {
             let image = Plane::from(&image);
-            let expected = corners(&image, threshold, border);
+            let search = Search { weak, strong: weak + more, border };
+            let (expected_strong, expected_weak): (Vec<_>, Vec<_>) =
+                corners(&image, weak, border).into_iter().partition(|corner| corner.score > search.strong);
             for level in levels() {
-                let mut found = Vec::new();
-                detect(level, &image, threshold, border, &mut Default::default(), &mut found);
-                prop_assert_eq!(&found, &expected, "{:?}", level);
+                let mut found = Corners::default();
+                detect(level, &image, search, &mut Default::default(), &mut found);
+                prop_assert_eq!(&found.strong, &expected_strong, "{:?}", level);
+                prop_assert_eq!(&found.weak, &expected_weak, "{:?}", level);
             }
         }
     }

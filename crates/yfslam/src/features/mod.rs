@@ -3,6 +3,7 @@
 //! In: a grey image. Out: key points with 256-bit binary descriptors (ORB-SLAM2, IEEE T-RO 2017, section III).
 
 mod brief;
+mod cells;
 mod distribute;
 mod fast;
 mod frame;

@@ -6,8 +6,9 @@
 use fearless_simd::Level;
 
 use super::brief::Describer;
+use super::cells::Cells;
 use super::distribute::Distributor;
-use super::fast::{self, Corner};
+use super::fast::{self, Corners, Search};
 use super::orientation::orientations;
 use super::{Descriptor, KeyPoint, PATCH_RADIUS};
 use crate::config::FeatureConfig;
@@ -32,7 +33,7 @@ pub struct OrbExtractor {
     level: Level,
     scale_factors: Vec<f32>,
     pyramid: Pyramid,
-    corners: Vec<Vec<Corner>>,
+    corners: Vec<Corners>,
     distributor: Distributor,
     describer: Describer,
     buffers: Buffers,
@@ -42,7 +43,7 @@ pub struct OrbExtractor {
 #[derive(Clone, Debug, Default)]
 struct Buffers {
     scores: [Vec<u8>; 3],
-    cell_has_strong: Vec<bool>,
+    cells: Cells,
     angles: Vec<f32>,
     blurred: Plane,
     line: Vec<u8>,
@@ -59,7 +60,7 @@ impl OrbExtractor {
             level,
             scale_factors: (0..levels).map(|octave| pyramid.scale_factor().powi(octave as i32)).collect(),
             pyramid,
-            corners: vec![Vec::new(); levels],
+            corners: vec![Corners::default(); levels],
             distributor: Distributor::default(),
             describer: Describer::new(),
             buffers: Buffers::default(),
@@ -83,19 +84,11 @@ impl OrbExtractor {
 
     /// Finds the corners of all levels; weak ones count only in cells that have no strong one.
     fn detect(&mut self) {
-        let (strong, cell) = (self.config.fast_threshold, self.config.cell_px.max(1));
-        let weak = self.config.fast_threshold_low.min(strong);
+        let strong = self.config.fast_threshold;
+        let search = Search { strong, weak: self.config.fast_threshold_low.min(strong), border: EDGE };
         for (image, corners) in self.pyramid.planes().iter().zip(&mut self.corners) {
-            fast::detect(self.level, image, weak, EDGE, &mut self.buffers.scores, corners);
-            let cells_per_row = image.width() / cell + 1;
-            let cell_of = |corner: &Corner| usize::from(corner.y) / cell * cells_per_row + usize::from(corner.x) / cell;
-            let has_strong = &mut self.buffers.cell_has_strong;
-            has_strong.clear();
-            has_strong.resize(cells_per_row * (image.height() / cell + 1), false);
-            for corner in corners.iter().filter(|corner| corner.score > strong) {
-                has_strong[cell_of(corner)] = true;
-            }
-            corners.retain(|corner| corner.score > strong || !has_strong[cell_of(corner)]);
+            fast::detect(self.level, image, search, &mut self.buffers.scores, corners);
+            self.buffers.cells.fill_empty(self.config.cell_px.max(1), [image.width(), image.height()], corners);
         }
     }
 
@@ -106,8 +99,8 @@ impl OrbExtractor {
         for (corners, scale) in self.corners.iter_mut().zip(&self.scale_factors).rev() {
             let share = 1.0 / scale;
             let quota = (left as f32 * share / share_left).round() as usize;
-            self.distributor.select(corners, quota.min(left));
-            left -= corners.len();
+            self.distributor.select(&mut corners.strong, quota.min(left));
+            left -= corners.strong.len();
             share_left -= share;
         }
     }
@@ -116,7 +109,7 @@ impl OrbExtractor {
     fn describe(&mut self, out: &mut Features) {
         let Buffers { angles, blurred, line, .. } = &mut self.buffers;
         for (octave, (image, corners)) in self.pyramid.planes().iter().zip(&self.corners).enumerate() {
-            let scale = self.scale_factors[octave];
+            let (corners, scale) = (&corners.strong, self.scale_factors[octave]);
             orientations(self.level, image, corners, angles);
             blur(self.level, image, blurred, line);
             self.describer.describe(blurred, corners, angles, &mut out.descriptors);
