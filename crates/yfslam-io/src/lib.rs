@@ -12,6 +12,7 @@
 mod ascending;
 pub mod camera;
 pub mod decode;
+pub mod depth;
 pub mod error;
 pub mod sequence;
 pub mod stream;
@@ -21,6 +22,7 @@ pub mod trajectory;
 pub mod write;
 
 pub use camera::{CameraSource, detect_camera, load_camera};
+pub use depth::{DepthStatistics, check_recording};
 pub use error::{Error, Result};
 pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};

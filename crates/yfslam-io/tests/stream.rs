@@ -7,8 +7,9 @@ use std::fs;
 use std::path::Path;
 
 use common::{SIZE, camera, color_png, depth_png, real_data, write_sequence};
+use yfslam::Camera;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
-use yfslam_io::{FrameStream, Sequence, SequenceOptions, detect_camera};
+use yfslam_io::{FrameStream, Sequence, SequenceOptions, check_recording, detect_camera};
 
 fn stream(folder: &Path) -> FrameStream {
     let sequence = Sequence::open(folder, &SequenceOptions::default()).unwrap();
@@ -89,4 +90,28 @@ fn the_development_recordings_decode_without_an_error() {
             ms(times.waited)
         );
     }
+}
+
+#[test]
+fn a_recording_is_checked_against_its_camera_before_it_is_played() {
+    let folder = tempfile::tempdir().unwrap();
+    write_sequence(folder.path(), 40);
+    let sequence = Sequence::open(folder.path(), &SequenceOptions::default()).unwrap();
+    let statistics = check_recording(&sequence, &camera()).unwrap();
+    assert!((statistics.median_m - 1.0004).abs() < 1e-9 && statistics.valid_share == 1.0, "{statistics:?}");
+
+    let refusal = |camera: &Camera| check_recording(&sequence, camera).unwrap_err().to_string();
+    let error = refusal(&Camera { depth_factor: 1e6, ..camera() });
+    assert!(
+        error.contains("depth factor 1000000") && error.contains("--depth-factor 5000 it would be 1.0 m"),
+        "{error}"
+    );
+    let error = refusal(&Camera { width: 640, height: 480, ..camera() });
+    assert!(
+        error.contains("none of the first 30 frames") && error.contains("8×6 pixels, but the camera has 640×480"),
+        "{error}"
+    );
+    // Single bad frames at the start do not hide the good ones.
+    fs::write(folder.path().join("rgb/0.png"), "").unwrap();
+    check_recording(&sequence, &camera()).unwrap();
 }
