@@ -1,1 +1,37 @@
-//! yfslam-detect
+//! Finds people and things in an image: YOLO-FastestV2 on the CPU, one thread, no dependencies on other runtimes.
+//!
+//! ```text
+//! model.onnx ─► onnx (protobuf) ─► graph (fused layers) ─► plan (memory, offsets)
+//!                                                             │
+//! RgbImage ─► preprocess (stretch, BGR) ─────────────────► run (kernels) ─► decode (anchors, NMS) ─► boxes
+//! ```
+//!
+//! ```no_run
+//! use yfslam::Detector;
+//! use yfslam_detect::{DetectorConfig, YoloFastestV2};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let image = yfslam::image::RgbImage::new(640, 480);
+//! let mut detector = YoloFastestV2::load("model.onnx".as_ref(), &DetectorConfig::default())?;
+//! let mut found = Vec::new();
+//! detector.detect(&image, &mut found)?;
+//! # Ok(()) }
+//! ```
+#![forbid(unsafe_code)]
+
+mod config;
+mod decode;
+mod error;
+mod graph;
+mod kernels;
+mod onnx;
+mod places;
+mod plan;
+mod preprocess;
+mod yolo;
+
+pub use config::DetectorConfig;
+pub use error::ModelError;
+pub use fearless_simd::Level;
+pub use kernels::available_levels;
+pub use yolo::{RawOutput, YoloFastestV2};

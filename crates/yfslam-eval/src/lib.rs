@@ -1,1 +1,31 @@
-//! yfslam-eval
+//! Accuracy of an estimated trajectory against a reference: ATE, RPE, tracked fraction, improvement, tables.
+//!
+//! ```text
+//! reference ─┐                    ┌─ ate ── align (SE(3), Sim(3)) ─┐
+//!            ├─ associate ─ Match ┤                                ├─ Statistics ─ table
+//! estimate ──┘                    └─ rpe ── pairs (frames, s, m) ──┘
+//! ```
+//!
+//! In: two trajectories as slices of [`StampedPose`]. Out: results that serialise with serde. The metrics are those of Sturm et al.,
+//! "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and agree with the tool `evo`; paper §4.2 reports them.
+//! [`evaluate`] does it all in one call; each step is public on its own.
+
+mod align;
+mod associate;
+mod coverage;
+mod error;
+mod evaluate;
+mod pose;
+mod rpe;
+mod statistics;
+mod table;
+
+pub use align::{Alignment, AlignmentKind, Ate, align, ate};
+pub use associate::{DEFAULT_MAX_DIFF_NS, Match, associate};
+pub use coverage::Coverage;
+pub use error::{EvalError, Trajectory};
+pub use evaluate::{EvalOptions, Evaluation, ExpectedFrames, evaluate};
+pub use pose::StampedPose;
+pub use rpe::{Delta, Rpe, RpeOptions, rpe};
+pub use statistics::{Statistics, improvement_percent};
+pub use table::{Table, TableStyle};

@@ -1,1 +1,30 @@
-//! yfslam-io
+//! Sequences and formats, in and out.
+//!
+//! ```text
+//! folder ──Sequence──► entries ──FrameStream──► RgbdFrame, or a FrameError for a frame that cannot be used
+//! preset, settings file or TOML ──load_camera──► Camera
+//! trajectory file ◄──► TrajectoryFile        points, pictures, text ──write_atomically──► files
+//! ```
+//!
+//! An [`Error`] ends what was asked for: it names the file, the value and the cure. A [`FrameError`] concerns one frame; the
+//! caller counts it and goes on.
+
+mod ascending;
+pub mod camera;
+pub mod decode;
+pub mod depth;
+pub mod error;
+pub mod sequence;
+pub mod stream;
+mod text;
+pub mod time;
+pub mod trajectory;
+pub mod write;
+
+pub use camera::{CameraSource, detect_camera, load_camera};
+pub use depth::{DepthStatistics, check_recording};
+pub use error::{Error, Result};
+pub use sequence::{Sequence, SequenceOptions};
+pub use stream::{FrameError, FrameFault, FrameStream};
+pub use trajectory::{StampedPose, TrajectoryFile, write_trajectory};
+pub use write::write_atomically;

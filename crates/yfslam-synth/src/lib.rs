@@ -1,1 +1,39 @@
-//! yfslam-synth
+//! A synthetic dynamic world: RGB-D sequences with people that move, and exact ground truth.
+//!
+//! ```text
+//! WorldConfig ─► scene ─► textures, light maps ─┐
+//!                people (skeleton, gait, way) ──┼─► render ─► sensor ─► SynthFrame
+//!                camera path ───────────────────┘
+//! ```
+//!
+//! ```
+//! # fn main() -> Result<(), yfslam_synth::WorldError> {
+//! let mut config = yfslam_synth::parse("synth:walking_xyz?seed=7&people=1&width=64&height=48&frames=10")?;
+//! config.light.shadow_rays = 0;
+//! let world = yfslam_synth::World::new(&config)?;
+//! let first = world.frame(0);
+//! assert_eq!(first.frame.color.width(), 64);
+//! assert_eq!(first.t_world_cam, world.pose(0));
+//! # Ok(())
+//! # }
+//! ```
+
+mod bvh;
+mod camera_path;
+mod config;
+mod light;
+mod mesh;
+mod people;
+mod render;
+mod rng;
+mod scene;
+mod sensor;
+mod spec;
+mod texture;
+mod world;
+
+pub use config::{
+    Activity, CameraMotion, LightConfig, MAX_PEOPLE, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera,
+};
+pub use spec::{is_spec, names, parse};
+pub use world::{SynthFrame, World};

@@ -5,6 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::dynamic::Method;
+use crate::dynamic::depth_group::Grouping;
+
 /// Field names and doc comments of a configuration section.
 pub type FieldDocs = &'static [(&'static str, &'static str)];
 
@@ -51,9 +54,277 @@ config_section! {
 }
 
 config_section! {
+    /// Motion-only optimisation (ORB-SLAM2, IEEE T-RO 2017, section III-B).
+    PoseOptimizerConfig {
+        /// Rounds of minimising and re-classifying outliers. Source: ORB-SLAM2.
+        rounds: usize = 4,
+        /// Rounds with the Huber kernel; later ones are plain least squares. Source: ORB-SLAM2.
+        robust_rounds: usize = 2,
+        /// Levenberg-Marquardt steps in a round. Source: ORB-SLAM2.
+        iterations: usize = 10,
+        /// A round ends when a step gains less than this share of the cost.
+        relative_tolerance: f64 = 1e-5,
+        /// First damping, relative to the diagonal.
+        initial_damping: f64 = 1e-5,
+    }
+}
+
+config_section! {
+    /// Bundle adjustment (Triggs et al. 2000; ORB-SLAM2 section III-B).
+    BundleConfig {
+        /// Steps before outliers are dropped. Source: ORB-SLAM2.
+        first_iterations: usize = 5,
+        /// Steps after outliers were dropped. Source: ORB-SLAM2.
+        second_iterations: usize = 10,
+        /// Adjustment ends when a step gains less than this share of the cost.
+        relative_tolerance: f64 = 1e-4,
+        /// First damping, relative to the diagonal.
+        initial_damping: f64 = 1e-4,
+    }
+}
+
+config_section! {
+    /// What the sensor measures, and how well.
+    DepthConfig {
+        /// Standard deviation of a corner's position at the finest level, px; grows with the scale of the level. Source: ORB-SLAM2.
+        corner_sigma_px: f64 = 1.0,
+        /// n in sigma_z = n z^2, 1/m. ORB-SLAM2's one pixel of disparity amounts to 1/bf = 0.025 at the finest level.
+        noise_per_m: f64 = 0.025,
+        /// Depth up to which a feature becomes a landmark at once, in baselines (bf / fx). Source: ORB-SLAM2's ThDepth.
+        close_limit_baselines: f64 = 40.0,
+        /// Readings beyond are ignored, m. Structured-light cameras see noise there.
+        max_m: f64 = 20.0,
+    }
+}
+
+config_section! {
+    /// Tracking (ORB-SLAM2, IEEE T-RO 2017, section III; ORB-SLAM, IEEE T-RO 2015, section V).
+    TrackingConfig {
+        /// Features needed to start a map. Source: ORB-SLAM2.
+        init_min_features: usize = 500,
+        /// Landmarks with depth needed to start a map.
+        init_min_landmarks: usize = 100,
+        /// Largest Hamming distance of a match in a projection search. Source: ORB-SLAM2's TH_HIGH.
+        hamming_high: u32 = 100,
+        /// Largest Hamming distance of a match without a projection to guide it. Source: ORB-SLAM2's TH_LOW.
+        hamming_low: u32 = 50,
+        /// Search radius around the prediction from the last frame, px at the finest level. Source: ORB-SLAM2.
+        motion_radius_px: f32 = 15.0,
+        /// Matches below which the radius is doubled and the search repeated. Source: ORB-SLAM2.
+        motion_min_matches: usize = 20,
+        /// Inliers with landmarks of the map that the first pose needs. Source: ORB-SLAM2.
+        motion_min_inliers: usize = 10,
+        /// Ratio of best to second-best distance against the reference keyframe. Source: ORB-SLAM2.
+        reference_ratio: f32 = 0.7,
+        /// Matches with the reference keyframe that are needed. Source: ORB-SLAM2.
+        reference_min_matches: usize = 15,
+        /// Features of the last frame that lend their depth to tracking without being landmarks. Source: ORB-SLAM2.
+        borrowed_points: usize = 100,
+        /// Keyframes in the local map at most. Source: ORB-SLAM2.
+        local_keyframes: usize = 80,
+        /// Covisible neighbours that each keyframe brings into the local map. Source: ORB-SLAM2.
+        local_neighbours: usize = 10,
+        /// Search radius for local landmarks seen head on (cosine above 0.998), px at the finest level. Source: ORB-SLAM2.
+        local_radius_narrow_px: f32 = 2.5,
+        /// Search radius for other local landmarks, px at the finest level. Source: ORB-SLAM2.
+        local_radius_px: f32 = 4.0,
+        /// Factor on both radii for RGB-D input. Source: ORB-SLAM2.
+        local_radius_factor: f32 = 3.0,
+        /// Ratio of best to second-best distance at the same level. Source: ORB-SLAM2.
+        local_ratio: f32 = 0.8,
+        /// Least cosine between viewing direction and the landmark's mean direction. Source: ORB-SLAM2.
+        min_view_cosine: f64 = 0.5,
+        /// Inliers in the local map that a tracked frame needs. Source: ORB-SLAM2.
+        local_min_inliers: usize = 30,
+    }
+}
+
+config_section! {
+    /// When a frame becomes a keyframe (ORB-SLAM2, IEEE T-RO 2017, section III-E).
+    KeyframeConfig {
+        /// Share of the reference keyframe's landmarks below which a keyframe is wanted. Source: ORB-SLAM2.
+        reference_ratio: f64 = 0.75,
+        /// The same while there are fewer than two keyframes. Source: ORB-SLAM2.
+        first_reference_ratio: f64 = 0.4,
+        /// Close features tracked below which, and not tracked above which, a keyframe is wanted. Source: ORB-SLAM2.
+        close_tracked: usize = 100,
+        /// See `close_tracked`. Source: ORB-SLAM2.
+        close_untracked: usize = 70,
+        /// Inliers that a keyframe needs. Source: ORB-SLAM2.
+        min_inliers: usize = 15,
+        /// Observation weight that makes a landmark count for the reference (a sight with depth weighs 2). Source: ORB-SLAM2.
+        min_observation_weight: usize = 3,
+        /// Frames between keyframes at least; 0 leaves it to the other rules. Source: ORB-SLAM2 with an idle mapper.
+        min_frames: u64 = 0,
+    }
+}
+
+config_section! {
+    /// Growth and refinement of the map (ORB-SLAM2 section III; ORB-SLAM section VI).
+    MappingConfig {
+        /// Landmarks made from depth beyond the close limit, if fewer close ones exist. Source: ORB-SLAM2.
+        min_depth_landmarks: usize = 100,
+        /// Found/visible below which a young landmark is dropped. Source: ORB-SLAM2.
+        min_found_ratio: f64 = 0.25,
+        /// Keyframes during which a landmark is young. Source: ORB-SLAM2.
+        probation_keyframes: u64 = 3,
+        /// Observation weight a landmark needs after two keyframes. Source: ORB-SLAM2.
+        min_observation_weight: usize = 4,
+        /// Covisible keyframes with which features without landmark are triangulated. Source: ORB-SLAM2.
+        triangulation_neighbours: usize = 10,
+        /// Ratio of best to second-best distance in triangulation. Source: ORB-SLAM2.
+        triangulation_ratio: f32 = 0.6,
+        /// Cosine of the parallax angle above which nothing is triangulated. Source: ORB-SLAM2.
+        max_parallax_cosine: f64 = 0.9998,
+        /// Covisible keyframes in which duplicates are sought. Source: ORB-SLAM2.
+        fuse_neighbours: usize = 10,
+        /// Neighbours of each of those that are searched too. Source: ORB-SLAM2.
+        fuse_second_neighbours: usize = 5,
+        /// Search radius for duplicates, px at the finest level. Source: ORB-SLAM2.
+        fuse_radius_px: f32 = 3.0,
+        /// Keyframes adjusted together at most, best covisible first.
+        window_keyframes: usize = 30,
+        /// Keyframes outside the window that hold it in place at most.
+        window_fixed: usize = 40,
+        /// Share of a keyframe's landmarks seen elsewhere above which it is dropped. Source: ORB-SLAM2.
+        redundant_share: f64 = 0.9,
+        /// Other keyframes that must see a landmark as finely to make a sight redundant. Source: ORB-SLAM2.
+        redundant_views: usize = 3,
+    }
+}
+
+config_section! {
+    /// Keeping moving things out (YF-SLAM, section 3.3).
+    DynamicConfig {
+        /// `none` (ORB-SLAM2), `boxes` (all features in boxes dropped) or `yf` (the paper).
+        method: Method = Method::Yf,
+        /// How the largest depth group is found: `ransac` (the paper, seeded) or `exact` (deterministic search).
+        grouping: Grouping = Grouping::Exact,
+        /// Names of the classes that can move.
+        movable: Vec<String> = vec!["person".to_owned()],
+        /// Score at which a box opens a track, and counts for `boxes`. Source: demo threshold of YOLO-FastestV2.
+        open_score: f32 = 0.3,
+        /// Score at which a box keeps a track.
+        keep_score: f32 = 0.1,
+        /// Overlap (IoU) of a box with the place predicted by its track.
+        track_min_iou: f32 = 0.3,
+        /// Frames over which a track is carried without a box.
+        max_misses: usize = 10,
+        /// Half the depth of a body, m. Source: NGD-SLAM's 0.33.
+        group_half_width_m: f32 = 0.33,
+        /// How much nearer than the body a limb may reach, m.
+        reach_m: f32 = 0.3,
+        /// Depth between a body and what is in front of it, m. Source: NGD-SLAM's gap between clusters.
+        group_gap_m: f32 = 0.1,
+        /// Share of a box's pixels that makes a body.
+        body_min_share: f32 = 0.15,
+        /// How far a body moves towards or from the camera between frames, m.
+        max_depth_step_m: f32 = 0.15,
+        /// Share of its size by which a box is grown on each side: limbs stick out.
+        margin: f32 = 0.1,
+        /// Distance from the body within which a corner sees its outline, px at the finest level.
+        edge_px: f32 = 6.0,
+        /// Features that must stay trusted; else the least certain boxes are given up.
+        min_trusted: usize = 60,
+        /// Seed of the random draws.
+        seed: u64 = 0,
+    }
+}
+
+config_section! {
     /// The whole configuration.
     Config {
         /// Feature extraction.
         features: FeatureConfig = FeatureConfig::default(),
+        /// Sensor noise.
+        depth: DepthConfig = DepthConfig::default(),
+        /// Dynamic filter.
+        dynamic: DynamicConfig = DynamicConfig::default(),
+        /// Tracking.
+        tracking: TrackingConfig = TrackingConfig::default(),
+        /// Keyframe policy.
+        keyframes: KeyframeConfig = KeyframeConfig::default(),
+        /// Mapping.
+        mapping: MappingConfig = MappingConfig::default(),
+        /// Motion-only optimisation.
+        pose: PoseOptimizerConfig = PoseOptimizerConfig::default(),
+        /// Bundle adjustment.
+        bundle: BundleConfig = BundleConfig::default(),
+    }
+}
+
+/// Sections of the configuration in the order of [`Config`], with the docs of their keys.
+const SECTIONS: &[(&str, &str, FieldDocs)] = &[
+    ("features", FeatureConfig::ABOUT, FeatureConfig::FIELDS),
+    ("depth", DepthConfig::ABOUT, DepthConfig::FIELDS),
+    ("dynamic", DynamicConfig::ABOUT, DynamicConfig::FIELDS),
+    ("tracking", TrackingConfig::ABOUT, TrackingConfig::FIELDS),
+    ("keyframes", KeyframeConfig::ABOUT, KeyframeConfig::FIELDS),
+    ("mapping", MappingConfig::ABOUT, MappingConfig::FIELDS),
+    ("pose", PoseOptimizerConfig::ABOUT, PoseOptimizerConfig::FIELDS),
+    ("bundle", BundleConfig::ABOUT, BundleConfig::FIELDS),
+];
+
+impl Config {
+    /// Reads a configuration; keys that are left out keep their defaults, unknown keys are refused.
+    ///
+    /// # Errors
+    /// With line, key and the keys that exist, if the text is not TOML or holds an unknown key or a value of the wrong type.
+    pub fn from_toml(text: &str) -> Result<Self, toml::de::Error> {
+        toml::from_str(text)
+    }
+
+    /// The configuration as TOML, each key under a comment with its meaning, unit and source.
+    ///
+    /// # Errors
+    /// If a value has no TOML form, such as a seed beyond 2^63.
+    pub fn to_commented_toml(&self) -> Result<String, toml::ser::Error> {
+        let table = toml::Table::try_from(self)?;
+        let mut text = String::new();
+        for (name, about, fields) in SECTIONS {
+            let Some(section) = table.get(*name) else { continue };
+            push_comment(&mut text, about);
+            text += &format!("[{name}]\n");
+            for (key, doc) in *fields {
+                if let Some(value) = section.get(key) {
+                    push_comment(&mut text, doc);
+                    text += &format!("{key} = {value}\n");
+                }
+            }
+            text.push('\n');
+        }
+        Ok(text)
+    }
+}
+
+fn push_comment(text: &mut String, doc: &str) {
+    for line in doc.lines() {
+        text.push('#');
+        text.push_str(line);
+        text.push('\n');
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_printed_configuration_reads_back_and_explains_every_key() {
+        let text = Config::default().to_commented_toml().unwrap();
+        assert_eq!(Config::from_toml(&text).unwrap(), Config::default());
+        let lines: Vec<&str> = text.lines().collect();
+        let keys = lines.iter().enumerate().filter(|(_, l)| l.contains(" = ") && !l.starts_with('#'));
+        assert!(keys.clone().count() > 60);
+        for (i, key) in keys {
+            assert!(i > 0 && lines[i - 1].starts_with("# "), "no comment above: {key}");
+        }
+        assert_eq!(SECTIONS.len(), Config::FIELDS.len(), "a section is missing from SECTIONS");
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_by_name() {
+        let error = Config::from_toml("[tracking]\nlocal_raduis_px = 4.0\n").unwrap_err().to_string();
+        assert!(error.contains("local_raduis_px") && error.contains("local_radius_px"), "{error}");
     }
 }

@@ -14,7 +14,7 @@ pub struct RgbdFrame {
     pub color: Arc<RgbImage>,
     /// Depth, registered to the colour image.
     pub depth: Arc<DepthImage>,
-    /// Boxes that are known already, from an outside detector or a renderer. `Some` replaces the run of the
-    /// system's own detector on this frame; the list may be empty.
+    /// Boxes of movable objects that are known already, from an outside detector or a renderer, whatever their class. `Some` replaces
+    /// the run of the system's own detector on this frame; the list may be empty.
     pub detections: Option<Vec<Detection>>,
 }

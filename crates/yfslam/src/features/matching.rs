@@ -1,9 +1,5 @@
-//! Comparing descriptors.
-//!
-//! In: descriptors and the indices worth comparing. Out: nearest neighbours in Hamming distance, and which matches agree on a
-//! rotation (ORB-SLAM, IEEE T-RO 2015, sections IV and V; constants as in ORB-SLAM2).
-
-use std::f32::consts::TAU;
+//! Comparing descriptors, and rotation consistency: matches between two images turn by the same angle (ORB-SLAM, IEEE T-RO 2015,
+//! section V-B).
 
 use fearless_simd::{Level, Simd, dispatch};
 
@@ -42,35 +38,41 @@ fn search<S: Simd>(_: S, query: &Descriptor, descriptors: &[Descriptor], candida
     [first, second].map(|neighbor| (neighbor.distance < u32::MAX).then_some(neighbor))
 }
 
-/// Bins of the rotation histogram. Source: ORB-SLAM2.
-const ROTATION_BINS: usize = 30;
+/// Bins of the histogram. Source: ORB-SLAM2.
+const BINS: usize = 30;
 
-/// Bins that may count as consistent. Source: ORB-SLAM2.
-const ROTATION_MAXIMA: usize = 3;
+/// A histogram of the turn of each match; those outside its three highest bins are outliers.
+#[derive(Clone, Debug, Default)]
+pub struct RotationHistogram {
+    entries: Vec<(u8, u32)>,
+}
 
-/// A lesser maximum counts only from this fraction of the greatest on. Source: ORB-SLAM2.
-const ROTATION_MIN_FRACTION: f32 = 0.1;
-
-/// Tells for each match whether its rotation (angle of one key point minus that of the other, radians) agrees with the bulk:
-/// whether it falls into one of the three fullest of 30 bins, the second and third not below a tenth of the first.
-///
-/// `consistent` takes the length of `rotations_rad`. Of equally full bins the one with the smaller angle comes first.
-pub fn consistent_rotations(rotations_rad: &[f32], consistent: &mut Vec<bool>) {
-    let bin =
-        |rotation: f32| (rotation.rem_euclid(TAU) * (ROTATION_BINS as f32 / TAU)).round() as usize % ROTATION_BINS;
-    let mut counts = [0u32; ROTATION_BINS];
-    for &rotation in rotations_rad {
-        counts[bin(rotation)] += 1;
+impl RotationHistogram {
+    /// Notes that match `payload` turned by `turn_rad`, any angle.
+    pub fn add(&mut self, turn_rad: f32, payload: u32) {
+        let turns = turn_rad / std::f32::consts::TAU;
+        // The fraction may round up to 1.
+        let bin = ((turns - turns.floor()) * BINS as f32) as usize % BINS;
+        self.entries.push((bin as u8, payload));
     }
-    let mut fullest: [usize; ROTATION_BINS] = std::array::from_fn(|bin| bin);
-    fullest.sort_unstable_by_key(|&bin| (std::cmp::Reverse(counts[bin]), bin));
-    let least = counts[fullest[0]] as f32 * ROTATION_MIN_FRACTION;
-    let mut kept = [false; ROTATION_BINS];
-    for &bin in &fullest[..ROTATION_MAXIMA] {
-        kept[bin] = counts[bin] as f32 >= least;
+
+    /// Calls `visit` for each match outside the dominant bins. The second and third bin count only if they hold at least a tenth of
+    /// the first.
+    pub fn for_each_outlier(&self, mut visit: impl FnMut(u32)) {
+        let mut counts = [0usize; BINS];
+        for (bin, _) in &self.entries {
+            counts[usize::from(*bin)] += 1;
+        }
+        let mut order: [usize; BINS] = std::array::from_fn(|i| i);
+        order.sort_by_key(|&bin| std::cmp::Reverse(counts[bin]));
+        let dominant =
+            order[..3].iter().filter(|&&bin| counts[bin] * 10 >= counts[order[0]]).fold(0u32, |m, &b| m | 1 << b);
+        for &(bin, payload) in &self.entries {
+            if dominant & (1 << bin) == 0 {
+                visit(payload);
+            }
+        }
     }
-    consistent.clear();
-    consistent.extend(rotations_rad.iter().map(|&rotation| kept[bin(rotation)]));
 }
 
 #[cfg(test)]
@@ -99,32 +101,16 @@ mod tests {
     }
 
     #[test]
-    fn matches_off_the_common_rotation_are_told_apart() {
-        let mut rotations = vec![0.1; 50];
-        rotations.extend([0.1 + TAU, 0.1 - TAU]);
-        rotations.extend([2.0; 6]); // a second maximum above a tenth
-        rotations.extend([4.0; 5]); // a third maximum below a tenth
-        let mut consistent = Vec::new();
-        consistent_rotations(&rotations, &mut consistent);
-        assert_eq!(consistent[..58], [true; 58]);
-        assert_eq!(consistent[58..], [false; 5]);
-    }
-
-    #[test]
-    fn no_more_than_three_rotations_are_kept() {
-        let rotations: Vec<f32> = (0..20).map(|i| (i % 5) as f32).collect();
-        let mut consistent = Vec::new();
-        consistent_rotations(&rotations, &mut consistent);
-        let expected: Vec<bool> = (0..20).map(|i| i % 5 < 3).collect();
-        assert_eq!(consistent, expected);
-    }
-
-    #[test]
-    fn no_matches_and_angles_that_are_not_numbers_do_no_harm() {
-        let mut consistent = vec![true];
-        consistent_rotations(&[], &mut consistent);
-        assert!(consistent.is_empty());
-        consistent_rotations(&[f32::NAN, f32::INFINITY, 1.0], &mut consistent);
-        assert_eq!(consistent.len(), 3);
+    fn matches_off_the_common_turn_are_outliers() {
+        let mut histogram = RotationHistogram::default();
+        for i in 0..40 {
+            histogram.add(0.3 + 0.001 * i as f32 - std::f32::consts::TAU, i);
+        }
+        for i in 40..43 {
+            histogram.add(1.0 + i as f32, i);
+        }
+        let mut outliers = Vec::new();
+        histogram.for_each_outlier(|i| outliers.push(i));
+        assert_eq!(outliers, [40, 41, 42]);
     }
 }

@@ -6,11 +6,13 @@ mod brief;
 mod cells;
 mod distribute;
 mod fast;
+mod frame;
 pub mod matching;
 mod orb;
 mod orientation;
 mod pattern;
 
+pub use frame::{Feature, FrameFeatures, ImageBounds};
 pub use orb::{Features, OrbExtractor};
 
 /// Radius of the patch from which orientation and descriptor are read, px of the level (Rublee et al., ICCV 2011: patch 31).

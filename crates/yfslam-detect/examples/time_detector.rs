@@ -1,0 +1,54 @@
+//! Times the forward pass and the whole `detect` on one thread: process CPU time, minimum and median, as one JSON line per
+//! instruction set.
+//!
+//! `cargo run --release -p yfslam-detect --example time_detector -- model.onnx [runs]`
+#![allow(clippy::print_stdout, reason = "the result goes to standard output")]
+
+use std::error::Error;
+use std::path::Path;
+
+use rustix::time::{ClockId, clock_gettime};
+use yfslam::Detector;
+use yfslam::image::RgbImage;
+use yfslam_detect::{DetectorConfig, YoloFastestV2, available_levels};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let model = arguments.next().ok_or("the path of an ONNX model is missing")?;
+    let runs: usize = arguments.next().map_or(Ok(200), |runs| runs.parse())?;
+    let pixels = (0..640 * 480_usize).map(|index| [index, index / 7, index / 640].map(|value| value as u8)).collect();
+    let image = RgbImage::from_vec(640, 480, pixels).ok_or("the test image has the wrong size")?;
+    for level in available_levels() {
+        let mut detector = YoloFastestV2::load(Path::new(&model), &DetectorConfig::default())?.with_level(level);
+        let (height, width) = detector.input_size();
+        let input: Vec<f32> = (0..3 * height * width).map(|index| (index * 37 % 256) as f32 / 255.0).collect();
+        let mut found = Vec::new();
+        let forward = time(runs, || detector.forward(&input))?;
+        let detect = time(runs, || detector.detect(&image, &mut found))?;
+        let level = format!("{level:?}");
+        let level = level.split('(').next().unwrap_or_default();
+        println!(
+            "{{\"level\": \"{level}\", \"forward_ms\": {:.3}, \"forward_median_ms\": {:.3}, \"detect_ms\": {:.3}, \
+             \"detect_median_ms\": {:.3}}}",
+            forward.0, forward.1, detect.0, detect.1
+        );
+    }
+    Ok(())
+}
+
+/// Minimum and median CPU time of `runs` calls, ms.
+fn time<E>(runs: usize, mut call: impl FnMut() -> Result<(), E>) -> Result<(f64, f64), E> {
+    let mut times = Vec::new();
+    for _ in 0..runs {
+        let start = cpu_ms();
+        call()?;
+        times.push(cpu_ms() - start);
+    }
+    times.sort_by(f64::total_cmp);
+    Ok((times[0], times[times.len() / 2]))
+}
+
+fn cpu_ms() -> f64 {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
+}

@@ -1,0 +1,130 @@
+//! Matrix product over planes: the 1×1 convolutions and the stem.
+//!
+//! In: a list of rows of floats (one per input channel or filter tap), packed weights. Out: one row per output channel.
+//! The inner loop keeps 6 output channels × 2 vectors in registers; rows are read where they lie, nothing is copied.
+
+use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
+
+/// Output channels computed together.
+pub(crate) const BLOCK: usize = 6;
+
+/// Widest vector in floats; rows are processed to the next multiple of it and must have that much room.
+pub(crate) const WIDEST: usize = 16;
+
+/// A weight matrix in the order in which the kernel reads it, padded with zero rows to a multiple of [`BLOCK`].
+#[derive(Debug)]
+pub(crate) struct Matrix {
+    depth: usize,
+    /// `[row / BLOCK][depth][BLOCK]`
+    weights: Vec<[f32; BLOCK]>,
+    bias: Vec<[f32; BLOCK]>,
+    relu: bool,
+}
+
+impl Matrix {
+    /// Packs `bias.len() × depth` row-major `weights`.
+    pub(crate) fn pack(weights: &[f32], bias: &[f32], relu: bool) -> Self {
+        let depth = weights.len() / bias.len();
+        let at = |row: usize, k: usize| weights.get(row * depth + k).copied().unwrap_or(0.0);
+        let blocks = bias.len().div_ceil(BLOCK);
+        Self {
+            depth,
+            weights: (0..blocks)
+                .flat_map(|block| (0..depth).map(move |k| std::array::from_fn(|row| at(block * BLOCK + row, k))))
+                .collect(),
+            bias: (0..blocks)
+                .map(|block| std::array::from_fn(|row| bias.get(block * BLOCK + row).copied().unwrap_or(0.0)))
+                .collect(),
+            relu,
+        }
+    }
+
+    /// Rows including padding.
+    pub(crate) fn padded_rows(&self) -> usize {
+        self.bias.len() * BLOCK
+    }
+}
+
+/// Where a product reads and writes, as offsets into the memory it is given.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rows<'a> {
+    /// One per column of the matrix.
+    pub(crate) inputs: &'a [usize],
+    /// One per padded row of the matrix.
+    pub(crate) outputs: &'a [usize],
+    /// Added to the product before ReLU, one per padded row, or empty.
+    pub(crate) addend: &'a [usize],
+    /// Floats per row.
+    pub(crate) length: usize,
+}
+
+/// `outputs = relu(weights · inputs + bias + addend)`.
+pub(crate) fn multiply(level: Level, memory: &mut [f32], matrix: &Matrix, rows: Rows) {
+    dispatch!(level, simd => multiply_simd(simd, memory, matrix, rows));
+}
+
+/// [`multiply`] from within a kernel.
+#[inline(always)]
+pub(crate) fn multiply_simd<S: Simd>(simd: S, memory: &mut [f32], matrix: &Matrix, rows: Rows) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let length = rows.length.next_multiple_of(WIDEST);
+            let wide = length / (2 * S::f32s::LEN) * 2 * S::f32s::LEN;
+            for column in (0..wide).step_by(2 * S::f32s::LEN) {
+                blocks::<S, 2>(simd, memory, matrix, rows, column);
+            }
+            for column in (wide..length).step_by(S::f32s::LEN) {
+                blocks::<S, 1>(simd, memory, matrix, rows, column);
+            }
+        },
+    );
+}
+
+/// All output channels for `V` vectors from `column` on.
+#[inline(always)]
+fn blocks<S: Simd, const V: usize>(simd: S, memory: &mut [f32], matrix: &Matrix, rows: Rows, column: usize) {
+    let floor = S::f32s::splat(simd, if matrix.relu { 0.0 } else { f32::NEG_INFINITY });
+    let blocks = matrix.weights.chunks_exact(matrix.depth).zip(&matrix.bias).zip(rows.outputs.as_chunks::<BLOCK>().0);
+    for (block, ((weights, bias), outputs)) in blocks.enumerate() {
+        let sums = product::<S, V>(simd, memory, weights, bias, rows.inputs, column);
+        for (row, (sums, output)) in sums.into_iter().zip(outputs).enumerate() {
+            for (vector, mut sum) in sums.into_iter().enumerate() {
+                let at = column + vector * S::f32s::LEN;
+                if let Some(addend) = rows.addend.get(block * BLOCK + row) {
+                    sum += load(simd, memory, addend + at);
+                }
+                sum.max(floor).store_slice(&mut memory[output + at..][..S::f32s::LEN]);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn product<S: Simd, const V: usize>(
+    simd: S,
+    memory: &[f32],
+    weights: &[[f32; BLOCK]],
+    bias: &[f32; BLOCK],
+    inputs: &[usize],
+    column: usize,
+) -> [[S::f32s; V]; BLOCK] {
+    let mut sums: [[S::f32s; V]; BLOCK] = bias.map(|bias| [S::f32s::splat(simd, bias); V]);
+    for (weights, input) in weights.iter().zip(inputs) {
+        let row = &memory[input + column..][..V * S::f32s::LEN];
+        let values: [S::f32s; V] = std::array::from_fn(|vector| load(simd, row, vector * S::f32s::LEN));
+        for (sums, weight) in sums.iter_mut().zip(weights) {
+            let weight = S::f32s::splat(simd, *weight);
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum = weight.mul_add(value, *sum);
+            }
+        }
+    }
+    sums
+}
+
+/// One vector from `memory` at `offset`.
+#[inline(always)]
+pub(crate) fn load<S: Simd>(simd: S, memory: &[f32], offset: usize) -> S::f32s {
+    S::f32s::from_slice(simd, &memory[offset..][..S::f32s::LEN])
+}

@@ -1,0 +1,105 @@
+//! Image in, network input out: plain bilinear stretch (no letterbox) with half-pixel centres, planes blue, green, red in [0, 1].
+//!
+//! Definition: output column x samples the input at (x + ½) · width_in / width_out − ½, clamped to the outermost pixel centres, and
+//! rows alike; all in f32 without rounding to 8 bit. This is what OpenCV's `resize` with `INTER_LINEAR` gives on a float image.
+
+use fearless_simd::{Level, dispatch};
+use yfslam::image::RgbImage;
+
+/// Keeps the sampling positions of the last image size.
+#[derive(Debug, Default)]
+pub(crate) struct Stretch {
+    sizes: (usize, usize),
+    columns: Vec<Sample>,
+    /// A row of the input, interpolated between two rows, its last pixel doubled.
+    line: Vec<[f32; 3]>,
+}
+
+/// Between pixel `index` and the next one, at `fraction` of the way.
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    index: usize,
+    fraction: f32,
+}
+
+fn sample(position: usize, from: usize, to: usize) -> Sample {
+    let source = (position as f64 + 0.5) * from as f64 / to as f64 - 0.5;
+    let clamped = source.clamp(0.0, (from - 1) as f64);
+    Sample { index: clamped as usize, fraction: clamped.fract() as f32 }
+}
+
+impl Stretch {
+    /// Fills `planes` (blue, green, red; each `height × width`) from a non-empty image.
+    pub(crate) fn run(
+        &mut self,
+        level: Level,
+        image: &RgbImage,
+        (height, width): (usize, usize),
+        [blue, green, red]: [&mut [f32]; 3],
+    ) {
+        if self.sizes != (image.width(), width) {
+            self.sizes = (image.width(), width);
+            self.columns = (0..width).map(|x| sample(x, image.width(), width)).collect();
+            self.line = vec![[0.0; 3]; image.width() + 1];
+        }
+        let rows = blue.chunks_exact_mut(width).zip(green.chunks_exact_mut(width)).zip(red.chunks_exact_mut(width));
+        for (y, ((blue, green), red)) in rows.enumerate() {
+            let Sample { index, fraction } = sample(y, image.height(), height);
+            let (upper, lower) = (image.row(index), image.row((index + 1).min(image.height() - 1)));
+            let line = self.line[..image.width()].as_flattened_mut();
+            dispatch!(level, _simd => blend(upper.as_flattened(), lower.as_flattened(), fraction, line));
+            self.line[image.width()] = self.line[image.width() - 1];
+            for (((blue, green), red), Sample { index, fraction }) in
+                blue.iter_mut().zip(green).zip(red).zip(&self.columns)
+            {
+                let [left, right] = [self.line[*index], self.line[index + 1]];
+                let mix = |channel: usize| left[channel] + (right[channel] - left[channel]) * fraction;
+                (*red, *green, *blue) = (mix(0), mix(1), mix(2));
+            }
+        }
+    }
+}
+
+/// `line` = (upper · (1 − fraction) + lower · fraction) / 255.
+#[inline(always)]
+fn blend(upper: &[u8], lower: &[u8], fraction: f32, line: &mut [f32]) {
+    for ((value, upper), lower) in line.iter_mut().zip(upper).zip(lower) {
+        let (upper, lower) = (f32::from(*upper), f32::from(*lower));
+        *value = (upper + (lower - upper) * fraction) * (1.0 / 255.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stretch(image: &RgbImage, size: (usize, usize)) -> [Vec<f32>; 3] {
+        let mut planes = [0; 3].map(|_| vec![0.0; size.0 * size.1]);
+        Stretch::default().run(Level::new(), image, size, planes.each_mut().map(|plane| &mut plane[..]));
+        planes
+    }
+
+    #[test]
+    fn an_image_of_the_right_size_is_only_scaled_and_reordered() {
+        let image = RgbImage::from_vec(2, 1, vec![[255, 51, 0], [0, 102, 255]]).unwrap();
+        for (plane, expected) in stretch(&image, (1, 2)).iter().zip([[0.0, 1.0], [0.2, 0.4], [1.0, 0.0]]) {
+            assert!(plane.iter().zip(expected).all(|(value, expected)| (value - expected).abs() < 1e-6), "{plane:?}");
+        }
+    }
+
+    #[test]
+    fn pixels_are_sampled_at_half_pixel_centres_and_clamped_at_the_border() {
+        let image = RgbImage::from_vec(2, 1, vec![[0; 3], [200; 3]]).unwrap();
+        let [plane, ..] = stretch(&image, (2, 4));
+        let expected = [0.0, 50.0, 150.0, 200.0, 0.0, 50.0, 150.0, 200.0].map(|value| value / 255.0);
+        for (value, expected) in plane.iter().zip(expected) {
+            assert!((value - expected).abs() < 1e-6, "{plane:?}");
+        }
+    }
+
+    #[test]
+    fn one_pixel_fills_the_whole_input() {
+        let image = RgbImage::from_vec(1, 1, vec![[0, 0, 255]]).unwrap();
+        assert_eq!(stretch(&image, (2, 2))[0], [1.0; 4]);
+    }
+}

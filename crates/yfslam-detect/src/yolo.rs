@@ -1,0 +1,201 @@
+//! YOLO-FastestV2 behind the core's `Detector` trait: model file and image in, boxes out.
+
+use std::path::Path;
+
+use fearless_simd::Level;
+use yfslam::image::RgbImage;
+use yfslam::{Detection, Detector, DetectorError};
+
+use crate::config::{COCO_ANCHORS, COCO_NAMES, DetectorConfig};
+use crate::decode::{Grid, suppress};
+use crate::onnx::Model;
+use crate::plan::Plan;
+use crate::preprocess::Stretch;
+use crate::{ModelError, graph};
+
+/// The detector network, loaded and ready. It runs on the calling thread and allocates nothing per image once the first one of
+/// a size has passed.
+#[derive(Debug)]
+pub struct YoloFastestV2 {
+    plan: Plan,
+    grids: Vec<Grid>,
+    config: DetectorConfig,
+    class_names: Vec<String>,
+    stretch: Stretch,
+    candidates: Vec<Detection>,
+}
+
+/// One output of the network as it leaves the last convolution, for verification.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawOutput {
+    /// Name in the model file.
+    pub name: String,
+    /// Channels, height, width.
+    pub shape: [usize; 3],
+    /// Logits, row-major.
+    pub values: Vec<f32>,
+}
+
+impl YoloFastestV2 {
+    /// Reads an ONNX file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is no ONNX model, holds another architecture, or does not fit `config`.
+    pub fn load(path: &Path, config: &DetectorConfig) -> Result<Self, ModelError> {
+        let name = path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|source| ModelError::Io { path: name.clone(), source })?;
+        Self::from_bytes(&name, &bytes, config)
+    }
+
+    /// Reads the contents of an ONNX file; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// As [`YoloFastestV2::load`].
+    pub fn from_bytes(name: &str, bytes: &[u8], config: &DetectorConfig) -> Result<Self, ModelError> {
+        let mismatch = |what: String| ModelError::Mismatch { model: name.into(), what };
+        check(config).map_err(mismatch)?;
+        let model = Model::parse(bytes).map_err(|error| ModelError::NotOnnx { model: name.into(), what: error.0 })?;
+        let mut config = config.clone();
+        if config.anchors.is_empty() {
+            config.anchors = match model.metadata.get("anchors") {
+                Some(text) => {
+                    parse_anchors(text).ok_or_else(|| mismatch(format!("cannot read the anchors \"{text}\"")))?
+                }
+                None => COCO_ANCHORS.map(Vec::from).into(),
+            };
+        }
+        let plan = Plan::new(name, graph::lower(name, &model)?, Level::new())?;
+        let (grids, classes) = Grid::find(name, &plan, &config.anchors)?;
+        let class_names = match model.metadata.get("names") {
+            _ if !config.class_names.is_empty() => config.class_names.clone(),
+            Some(text) => parse_names(text),
+            None if classes == COCO_NAMES.len() => COCO_NAMES.map(String::from).into(),
+            None => return Err(mismatch(format!("the model has {classes} classes without names; set `class_names`"))),
+        };
+        if class_names.len() != classes {
+            return Err(mismatch(format!(
+                "the model has {classes} classes, but {} names are given",
+                class_names.len()
+            )));
+        }
+        Ok(Self { plan, grids, config, class_names, stretch: Stretch::default(), candidates: Vec::new() })
+    }
+
+    /// Uses the instruction set `level` instead of the best one, to compare and to test.
+    #[must_use]
+    pub fn with_level(mut self, level: Level) -> Self {
+        self.plan.level = level;
+        self
+    }
+
+    /// Height and width of the network input, px.
+    pub fn input_size(&self) -> (usize, usize) {
+        self.plan.input_size
+    }
+
+    /// The forward pass alone on `[3, height, width]` values: blue, green, red, each in [0, 1].
+    ///
+    /// # Errors
+    /// If `input` has another length.
+    pub fn forward(&mut self, input: &[f32]) -> Result<(), DetectorError> {
+        let (height, width) = self.plan.input_size;
+        if input.len() != 3 * height * width {
+            return Err(DetectorError(format!("{} values given, 3 × {height} × {width} expected", input.len())));
+        }
+        for (plane, values) in self.plan.input_mut().into_iter().zip(input.chunks_exact(height * width)) {
+            plane.copy_from_slice(values);
+        }
+        self.plan.run();
+        Ok(())
+    }
+
+    /// The raw outputs of the last image or forward pass, in the order of the model file.
+    pub fn raw_outputs(&self) -> Vec<RawOutput> {
+        let output = |map: &crate::plan::Map| RawOutput {
+            name: map.name.clone(),
+            shape: [map.planes.len(), map.size.0, map.size.1],
+            values: (0..map.planes.len()).flat_map(|plane| self.plan.plane(map, plane)).copied().collect(),
+        };
+        self.plan.outputs.iter().map(output).collect()
+    }
+}
+
+impl Detector for YoloFastestV2 {
+    fn class_names(&self) -> &[String] {
+        &self.class_names
+    }
+
+    fn detect(&mut self, image: &RgbImage, out: &mut Vec<Detection>) -> Result<(), DetectorError> {
+        out.clear();
+        let (image_width, image_height) = (image.width(), image.height());
+        if image_width == 0 || image_height == 0 {
+            return Err(DetectorError(format!("the image is empty ({image_width} × {image_height} px)")));
+        }
+        let (height, width) = self.plan.input_size;
+        self.stretch.run(self.plan.level, image, (height, width), self.plan.input_mut());
+        self.plan.run();
+
+        self.candidates.clear();
+        for grid in &self.grids {
+            grid.candidates(&self.plan, self.config.score_threshold, &mut self.candidates);
+        }
+        suppress(&mut self.candidates, &self.config, out);
+        let [image_width, image_height] = [image_width, image_height].map(|side| side as f32);
+        let scale = [image_width / width as f32, image_height / height as f32];
+        for Detection { bbox, .. } in out.iter_mut() {
+            [bbox.x_min, bbox.x_max] = [bbox.x_min, bbox.x_max].map(|x| (x * scale[0]).clamp(0.0, image_width));
+            [bbox.y_min, bbox.y_max] = [bbox.y_min, bbox.y_max].map(|y| (y * scale[1]).clamp(0.0, image_height));
+        }
+        out.retain(|detection| detection.bbox.area() > 0.0);
+        Ok(())
+    }
+}
+
+fn check(config: &DetectorConfig) -> Result<(), String> {
+    let DetectorConfig { score_threshold, iou_threshold, anchors, .. } = config;
+    if !(*score_threshold > 0.0 && *score_threshold < 1.0) {
+        return Err(format!("score_threshold = {score_threshold} must lie between 0 and 1"));
+    }
+    if !(*iou_threshold > 0.0 && *iou_threshold <= 1.0) {
+        return Err(format!("iou_threshold = {iou_threshold} must lie between 0 and 1"));
+    }
+    let wrong = |anchor: &&[f32; 2]| anchor.iter().any(|side| !(side.is_finite() && *side > 0.0));
+    match anchors.iter().flatten().find(wrong) {
+        Some(anchor) => Err(format!("anchors: {anchor:?} must be a width and a height above 0 px")),
+        None => Ok(()),
+    }
+}
+
+/// Class names in a model's metadata: `{0: 'person', 1: 'chair'}`, `["person", "chair"]` or `person, chair`.
+fn parse_names(text: &str) -> Vec<String> {
+    let inner = text.trim().trim_matches(['{', '}', '[', ']']);
+    let name = |entry: &str| {
+        let name = entry.split_once(':').map_or(entry, |(_, name)| name);
+        name.trim().trim_matches(['\'', '"']).to_owned()
+    };
+    inner.split(',').map(name).filter(|name| !name.is_empty()).collect()
+}
+
+/// Anchors in a model's metadata: widths and heights in pairs, six pairs, whatever brackets and commas stand between.
+fn parse_anchors(text: &str) -> Option<Vec<Vec<[f32; 2]>>> {
+    let numbers = text.split(|c: char| !(c.is_ascii_digit() || c == '.')).filter(|word| !word.is_empty());
+    let numbers: Vec<f32> = numbers.map(|word| word.parse().ok().filter(|side| *side > 0.0)).collect::<Option<_>>()?;
+    let (pairs, rest) = numbers.as_chunks::<2>();
+    let (grids, odd) = pairs.as_chunks::<3>();
+    (grids.len() == 2 && rest.is_empty() && odd.is_empty()).then(|| grids.iter().map(|grid| grid.to_vec()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metadata_is_read_in_the_usual_spellings() {
+        for text in ["{0: 'person', 1: 'dining table'}", r#"["person", "dining table"]"#, "person,dining table"] {
+            assert_eq!(parse_names(text), ["person", "dining table"], "{text}");
+        }
+        let anchors = parse_anchors("[[[1,2],[3,4.5],[5,6]],[[7,8],[9,10],[11,12]]]").unwrap();
+        assert_eq!(anchors, [[[1.0, 2.0], [3.0, 4.5], [5.0, 6.0]], [[7.0, 8.0], [9.0, 10.0], [11.0, 12.0]]]);
+        assert_eq!(parse_anchors("1,2,3"), None);
+    }
+}

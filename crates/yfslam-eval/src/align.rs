@@ -1,0 +1,123 @@
+//! In: matched poses. Out: the transform that brings the estimate closest to the reference, and the absolute trajectory error.
+//!
+//! Minimises Σ ‖r − (s R e + t)‖² in closed form: rotation by the largest eigenvector of the quaternion matrix of Horn, "Closed-form
+//! solution of absolute orientation using unit quaternions", JOSA A 1987, §4; scale as in Umeyama, TPAMI 1991, equation 42.
+
+use crate::{EvalError, Match, StampedPose, Statistics};
+use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Eigenvalue gap, as a fraction of the largest eigenvalue, below which the rotation is noise: 1 µm across for each metre along.
+const MIN_RELATIVE_GAP: f64 = 1e-12;
+/// Spread, as a fraction of the distance from the origin (1 m at least), below which positions are one point up to rounding.
+const MIN_RELATIVE_SPREAD: f64 = 1e-9;
+
+/// Which transforms the alignment may use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AlignmentKind {
+    /// Rotation and translation: for sensors that measure scale, such as RGB-D.
+    #[default]
+    Se3,
+    /// Rotation, translation and scale: for monocular estimates. It hides scale drift, so say so beside the figure.
+    Sim3,
+}
+
+/// A transform from the world of the estimate into the world of the reference: x ↦ scale · rotation · x + translation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Alignment {
+    /// What the alignment was free to choose.
+    pub kind: AlignmentKind,
+    /// Rotation; serialised as x, y, z, w.
+    pub rotation: UnitQuaternion<f64>,
+    /// Translation, m.
+    pub translation: Vector3<f64>,
+    /// Scale, 1 for [`AlignmentKind::Se3`].
+    pub scale: f64,
+}
+
+impl Alignment {
+    /// The estimated pose as it stands in the world of the reference.
+    pub fn apply(&self, pose: &StampedPose) -> StampedPose {
+        let position = self.scale * (self.rotation * pose.t_world_cam.translation.vector) + self.translation;
+        let rotation = self.rotation * pose.t_world_cam.rotation;
+        StampedPose::new(pose.timestamp_ns, Isometry3::from_parts(position.into(), rotation))
+    }
+}
+
+/// Absolute trajectory error: distances between reference and aligned estimated positions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ate {
+    /// The alignment used.
+    pub alignment: Alignment,
+    /// Distances, m.
+    pub translation_m: Statistics,
+}
+
+/// Finds the transform that brings the estimated positions closest, in the least squares sense, to the reference.
+///
+/// # Errors
+/// Fewer than three matches; positions on a line or at a point.
+pub fn align(matches: &[Match], kind: AlignmentKind) -> Result<Alignment, EvalError> {
+    if matches.len() < 3 {
+        return Err(EvalError::TooFewMatches { found: matches.len(), needed: 3 });
+    }
+    let n = matches.len() as f64;
+    let mean_r = matches.iter().map(|m| position(&m.reference)).sum::<Vector3<f64>>() / n;
+    let mean_e = matches.iter().map(|m| position(&m.estimate)).sum::<Vector3<f64>>() / n;
+    let centred = || matches.iter().map(|m| (position(&m.reference) - mean_r, position(&m.estimate) - mean_e));
+    let square_r: f64 = centred().map(|(r, _)| r.norm_squared()).sum();
+    let square_e: f64 = centred().map(|(_, e)| e.norm_squared()).sum();
+    let correlation: Matrix3<f64> = centred().map(|(r, e)| e * r.transpose()).sum();
+
+    let (reference_spread_m, estimate_spread_m) = ((square_r / n).sqrt(), (square_e / n).sqrt());
+    let at_one_point = |spread_m: f64, mean: &Vector3<f64>| spread_m <= MIN_RELATIVE_SPREAD * mean.norm().max(1.0);
+    let eigen = SymmetricEigen::new(horn_matrix(&correlation));
+    let best = eigen.eigenvalues.imax();
+    let largest = eigen.eigenvalues.max();
+    let second =
+        eigen.eigenvalues.iter().enumerate().filter(|&(i, _)| i != best).map(|(_, &v)| v).fold(f64::MIN, f64::max);
+    if at_one_point(reference_spread_m, &mean_r)
+        || at_one_point(estimate_spread_m, &mean_e)
+        || largest - second <= MIN_RELATIVE_GAP * largest
+    {
+        return Err(EvalError::Degenerate { reference_spread_m, estimate_spread_m });
+    }
+
+    let q = eigen.eigenvectors.column(best);
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]));
+    // The largest eigenvalue is Σ r · R e.
+    let scale = if kind == AlignmentKind::Sim3 { largest / square_e } else { 1.0 };
+    Ok(Alignment { kind, rotation, translation: mean_r - scale * (rotation * mean_e), scale })
+}
+
+/// Absolute trajectory error of matched poses after alignment (Sturm et al. 2012, §V-B).
+///
+/// # Errors
+/// Those of [`align`].
+pub fn ate(matches: &[Match], kind: AlignmentKind) -> Result<Ate, EvalError> {
+    let alignment = align(matches, kind)?;
+    let error_m = |m: &Match| (position(&m.reference) - position(&alignment.apply(&m.estimate))).norm();
+    let errors_m: Vec<f64> = matches.iter().map(error_m).collect();
+    let translation_m = Statistics::of(&errors_m).ok_or(EvalError::TooFewMatches { found: 0, needed: 3 })?;
+    Ok(Ate { alignment, translation_m })
+}
+
+fn position(pose: &StampedPose) -> Vector3<f64> {
+    pose.t_world_cam.translation.vector
+}
+
+/// Horn's symmetric matrix N, whose quadratic form in a unit quaternion (w, x, y, z) is Σ r · R e, from S = Σ e rᵀ.
+fn horn_matrix(s: &Matrix3<f64>) -> Matrix4<f64> {
+    let (sxx, sxy, sxz) = (s.m11, s.m12, s.m13);
+    let (syx, syy, syz) = (s.m21, s.m22, s.m23);
+    let (szx, szy, szz) = (s.m31, s.m32, s.m33);
+    #[rustfmt::skip]
+    let n = Matrix4::new(
+        sxx + syy + szz, syz - szy,        szx - sxz,        sxy - syx,
+        syz - szy,       sxx - syy - szz,  sxy + syx,        szx + sxz,
+        szx - sxz,       sxy + syx,       -sxx + syy - szz,  syz + szy,
+        sxy - syx,       szx + sxz,        syz + szy,       -sxx - syy + szz,
+    );
+    n
+}

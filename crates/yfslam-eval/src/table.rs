@@ -1,0 +1,89 @@
+//! In: headers and cells. Out: an aligned table, as plain text for a terminal or as Markdown.
+
+/// How a table is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TableStyle {
+    /// Columns two spaces apart, a rule under the header.
+    #[default]
+    Plain,
+    /// GitHub Markdown, aligned in its source as well.
+    Markdown,
+}
+
+/// A table; its first column is aligned left, the others right.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// An empty table with the given column headers.
+    pub fn new<S: Into<String>>(headers: impl IntoIterator<Item = S>) -> Self {
+        Self { rows: vec![headers.into_iter().map(Into::into).collect()] }
+    }
+
+    /// Appends a row; missing cells stay empty.
+    pub fn push<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// The table as text; each line ends with a newline and without trailing spaces.
+    pub fn render(&self, style: TableStyle) -> String {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let cell = |row: &[String], column: usize| match row.get(column) {
+            // A bar would end the Markdown cell.
+            Some(text) if style == TableStyle::Markdown => text.replace('|', "\\|"),
+            Some(text) => text.clone(),
+            None => String::new(),
+        };
+        let width = |column| self.rows.iter().map(|r| cell(r, column).chars().count()).max().unwrap_or(0);
+        // Three is the shortest rule that every Markdown reader takes.
+        let widths: Vec<usize> = (0..columns).map(|c| width(c).max(3)).collect();
+
+        let line = |cells: Vec<String>| match style {
+            TableStyle::Plain => format!("{}\n", cells.join("  ").trim_end()),
+            TableStyle::Markdown => format!("| {} |\n", cells.join(" | ")),
+        };
+        let rule = |(column, &width): (usize, &usize)| match style {
+            TableStyle::Markdown if column > 0 => format!("{}:", "-".repeat(width - 1)),
+            _ => "-".repeat(width),
+        };
+        let mut text = String::new();
+        for (index, row) in self.rows.iter().enumerate() {
+            let pad = |(column, &width): (usize, &usize)| match column {
+                0 => format!("{:<width$}", cell(row, column)),
+                _ => format!("{:>width$}", cell(row, column)),
+            };
+            text += &line(widths.iter().enumerate().map(pad).collect());
+            if index == 0 {
+                text += &line(widths.iter().enumerate().map(rule).collect());
+            }
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> Table {
+        let mut table = Table::new(["sequence", "RMSE", "n"]);
+        table.push(["crowd|1", "0.0156", "1200"]);
+        table.push(["größer", "12.0"]);
+        table
+    }
+
+    #[test]
+    fn plain_columns_line_up() {
+        let expected = "sequence    RMSE     n\n--------  ------  ----\ncrowd|1   0.0156  1200\ngrößer      12.0\n";
+        assert_eq!(example().render(TableStyle::Plain), expected);
+    }
+
+    #[test]
+    fn markdown_aligns_figures_right_and_escapes_bars() {
+        let expected = "| sequence |   RMSE |    n |\n| -------- | -----: | ---: |\n| crowd\\|1 | 0.0156 | 1200 |\n\
+                        | größer   |   12.0 |      |\n";
+        assert_eq!(example().render(TableStyle::Markdown), expected);
+    }
+}

@@ -1,0 +1,61 @@
+//! Refuses values that no camera has, before they turn into a trajectory of nonsense.
+
+use yfslam::Camera;
+
+use crate::error::{Error, Result};
+
+/// Largest side of an image, px.
+const MAX_SIDE: usize = 16_384;
+
+/// Largest error of undistorting and distorting a point again, px. Beyond it the distortion folds the image over.
+const MAX_ROUND_TRIP_PX: f64 = 0.5;
+
+/// Checks that `camera`, which came from `origin`, can be a camera.
+///
+/// # Errors
+/// The first value out of range: sizes, focal lengths, depth factor, rate and `bf` must be positive and finite, and the distortion
+/// must be invertible up to the border of the image.
+pub fn check_camera(camera: &Camera, origin: &str) -> Result<()> {
+    let refuse = |problem: String, cure: &str| Err(Error::argument(format!("camera {origin}: {problem}"), cure));
+    for (name, side) in [("width", camera.width), ("height", camera.height)] {
+        if !(1..=MAX_SIDE).contains(&side) {
+            return refuse(format!("{name} is {side}"), "give the size of the images in pixels");
+        }
+    }
+    let positive = [
+        ("fx", camera.fx, "give the focal length in pixels"),
+        ("fy", camera.fy, "give the focal length in pixels"),
+        ("depth factor", camera.depth_factor, "give the depth units per metre: 5000 for TUM, 1000 for millimetres"),
+        ("fps", camera.fps, "give the frames per second, such as 30"),
+        ("bf", camera.bf, "give the baseline of the depth sensor times fx, such as 40"),
+    ];
+    for (name, value, cure) in positive {
+        if !(value.is_finite() && value > 0.0) {
+            return refuse(format!("{name} is {value}"), cure);
+        }
+    }
+    let others = [camera.cx, camera.cy].into_iter().chain(camera.distortion);
+    if let Some(value) = others.into_iter().find(|value| !value.is_finite()) {
+        return refuse(format!("principal point or distortion holds {value}"), "calibrate the camera again");
+    }
+    check_distortion(camera).or_else(|(u, v)| {
+        let problem = format!("distortion {:?} folds the image at pixel ({u:.0}, {v:.0})", camera.distortion);
+        refuse(problem, "check the order k1, k2, p1, p2, k3, or set them to 0 for rectified images")
+    })
+}
+
+/// Undistorts corners and edge centres and distorts them again; the pixel at which that fails.
+fn check_distortion(camera: &Camera) -> std::result::Result<(), (f64, f64)> {
+    let (right, bottom) = ((camera.width - 1) as f64, (camera.height - 1) as f64);
+    for u in [0.0, right / 2.0, right] {
+        for v in [0.0, bottom / 2.0, bottom] {
+            let [x, y] = camera.undistort(u, v);
+            let [u_again, v_again] = camera.distort(x, y);
+            let error_px = (u_again - u).hypot(v_again - v);
+            if error_px.is_nan() || error_px > MAX_ROUND_TRIP_PX {
+                return Err((u, v));
+            }
+        }
+    }
+    Ok(())
+}

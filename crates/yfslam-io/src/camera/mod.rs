@@ -1,0 +1,94 @@
+//! Where the camera comes from: a preset, a settings file in the style of ORB-SLAM2 and 3, or our own TOML.
+
+mod check;
+mod opencv;
+mod presets;
+
+use std::path::{Path, PathBuf};
+
+use yfslam::Camera;
+
+use crate::error::{Error, Result};
+use crate::text::read_text;
+pub use check::check_camera;
+pub use opencv::parse_opencv_settings;
+pub use presets::{PRESETS, preset};
+
+/// Camera files looked for in a sequence folder, in this order.
+const CAMERA_FILES: [&str; 3] = ["camera.toml", "camera.yaml", "camera.yml"];
+
+/// A checked camera and where it came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraSource {
+    /// The calibration.
+    pub camera: Camera,
+    /// The preset or file, for people.
+    pub origin: String,
+    /// Keys of the file that say nothing about the camera and were not used.
+    pub unused_keys: Vec<String>,
+}
+
+/// Loads the preset or file that `spec` names; a relative path is tried as it is, then inside the folder `near`.
+///
+/// # Errors
+/// An unknown name, an unreadable or malformed file, a missing key, or values that no camera has.
+pub fn load_camera(spec: &str, near: Option<&Path>) -> Result<CameraSource> {
+    let candidates = [Some(PathBuf::from(spec)), near.map(|folder| folder.join(spec))];
+    if let Some(path) = candidates.into_iter().flatten().find(|path| path.is_file()) {
+        return load_file(&path);
+    }
+    match preset(spec) {
+        Some(camera) => {
+            Ok(CameraSource { camera, origin: format!("preset {}", spec.to_ascii_lowercase()), unused_keys: vec![] })
+        }
+        None => {
+            let problem = format!("camera '{spec}' is neither a file nor a preset");
+            Err(Error::argument(
+                problem,
+                format!("give the path of a .yaml or .toml file or one of {}", PRESETS.join(", ")),
+            ))
+        }
+    }
+}
+
+/// Looks for `camera.toml`, `camera.yaml` or `camera.yml` in a sequence folder.
+///
+/// # Errors
+/// None is there, or as for [`load_camera`].
+pub fn detect_camera(folder: &Path) -> Result<CameraSource> {
+    match CAMERA_FILES.iter().map(|name| folder.join(name)).find(|path| path.is_file()) {
+        Some(path) => load_file(&path),
+        None => {
+            let problem = format!("holds no camera file ({})", CAMERA_FILES.join(", "));
+            Err(Error::content(folder, problem, format!("give --camera with a file or one of {}", PRESETS.join(", "))))
+        }
+    }
+}
+
+fn load_file(path: &Path) -> Result<CameraSource> {
+    let text = read_text(path)?;
+    let source = if path.extension().is_some_and(|extension| extension == "toml") {
+        parse_toml(&text, path)?
+    } else {
+        parse_opencv_settings(&text, path)?
+    };
+    check_camera(&source.camera, &source.origin)?;
+    Ok(source)
+}
+
+/// Parses our own TOML: the fields of [`Camera`], unknown keys refused.
+///
+/// # Errors
+/// A syntax error, a missing or an unknown key, with its line.
+pub fn parse_toml(text: &str, path: &Path) -> Result<CameraSource> {
+    let camera = toml::from_str(text).map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start);
+        let line = 1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count();
+        let cure = "keys are width, height, fx, fy, cx, cy, depth_factor and, if you like, distortion, fps, bf";
+        Error::line(path, line, error.message(), cure)
+    })?;
+    Ok(CameraSource { camera, origin: path.display().to_string(), unused_keys: vec![] })
+}
+
+#[cfg(test)]
+mod tests;

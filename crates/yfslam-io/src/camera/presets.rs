@@ -1,0 +1,32 @@
+//! Calibrations published with the data sets.
+
+use yfslam::Camera;
+
+/// Names of the presets.
+pub const PRESETS: [&str; 4] = ["tum1", "tum2", "tum3", "bonn"];
+
+/// The preset of that name; upper or lower case.
+///
+/// Sources: the ORB-SLAM2 settings for TUM RGB-D freiburg1, 2 and 3; the calibration published with the Bonn RGB-D Dynamic data set
+/// (Palazzolo et al., IROS 2019).
+pub fn preset(name: &str) -> Option<Camera> {
+    let (intrinsics, distortion, depth_factor) = match name.to_ascii_lowercase().as_str() {
+        "tum1" => (
+            [517.306408, 516.469215, 318.643040, 255.313989],
+            [0.262383, -0.953104, -0.005358, 0.002628, 1.163314],
+            5000.0,
+        ),
+        "tum2" => (
+            [520.908620, 521.007327, 325.141442, 249.701764],
+            [0.231222, -0.784899, -0.003257, -0.000105, 0.917205],
+            5208.0,
+        ),
+        "tum3" => ([535.4, 539.2, 320.1, 247.6], [0.0; 5], 5000.0),
+        "bonn" => {
+            ([542.822841, 542.576870, 315.593520, 237.756098], [0.039903, -0.099343, -0.000730, -0.000144, 0.0], 5000.0)
+        }
+        _ => return None,
+    };
+    let [fx, fy, cx, cy] = intrinsics;
+    Some(Camera { width: 640, height: 480, fx, fy, cx, cy, distortion, depth_factor, fps: 30.0, bf: 40.0 })
+}

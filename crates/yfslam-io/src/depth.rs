@@ -1,0 +1,172 @@
+//! Depth values of a recording: their spread, and whether the depth factor can be right.
+//!
+//! A wrong factor is the most common mistake with RGB-D recordings, and nothing downstream notices: the trajectory comes out whole, in
+//! the wrong scale, and every threshold in metres misses.
+
+use std::ops::RangeInclusive;
+
+use yfslam::Camera;
+use yfslam::image::Image;
+
+use crate::error::{Error, Result};
+use crate::sequence::Sequence;
+use crate::stream::{DEFAULT_LOOK_AHEAD, FrameStream};
+
+/// Medians of depth that a recording of rooms, desks or corridors can have, m.
+pub const PLAUSIBLE_MEDIAN_M: RangeInclusive<f64> = 0.1..=20.0;
+
+/// Depth units per metre in use: millimetres, TUM and Bonn, 0.1 mm, centimetres, metres.
+const COMMON_FACTORS: [f64; 5] = [1000.0, 5000.0, 10_000.0, 100.0, 1.0];
+
+/// Medians of depth worth suggesting a factor for, m.
+const LIKELY_MEDIAN_M: RangeInclusive<f64> = 0.4..=8.0;
+
+/// Frames that [`check_recording`] looks at, and how many it tries to get them.
+const PROBE_FRAMES: usize = 5;
+const PROBE_ATTEMPTS: usize = 30;
+
+/// Depth of several images, in metres; exact order statistics (nearest rank) over all measured pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthStatistics {
+    /// Share of pixels with a measurement, 0 to 1.
+    pub valid_share: f64,
+    /// 5th percentile, m.
+    pub p5_m: f64,
+    /// Median, m.
+    pub median_m: f64,
+    /// 95th percentile, m.
+    pub p95_m: f64,
+}
+
+impl DepthStatistics {
+    /// Statistics of `images`, in sensor units of `depth_factor` a metre; `None` if no pixel has a measurement.
+    pub fn of<'a>(images: impl IntoIterator<Item = &'a Image<u16>>, depth_factor: f64) -> Option<Self> {
+        let mut histogram = vec![0u64; 1 << 16];
+        for &raw in images.into_iter().flat_map(|image| image.data()) {
+            if let Some(count) = histogram.get_mut(usize::from(raw)) {
+                *count += 1;
+            }
+        }
+        let pixels: u64 = histogram.iter().sum();
+        let unmeasured = histogram.first().copied().unwrap_or(0);
+        let measured = pixels - unmeasured;
+        let quantile_m = |quantile: f64| {
+            let rank = unmeasured + ((quantile * measured as f64).ceil() as u64).max(1);
+            let mut seen = 0;
+            let raw = histogram.iter().position(|count| {
+                seen += count;
+                seen >= rank
+            });
+            raw.map(|raw| raw as f64 / depth_factor)
+        };
+        let valid_share = measured as f64 / pixels as f64;
+        Some(Self { valid_share, p5_m: quantile_m(0.05)?, median_m: quantile_m(0.5)?, p95_m: quantile_m(0.95)? })
+    }
+}
+
+/// Statistics of the first depth images of a recording, if `depth_factor` makes them plausible.
+///
+/// # Errors
+/// No image has a measurement, or the median lies outside [`PLAUSIBLE_MEDIAN_M`]; the message says which factors would fit.
+pub fn check_depth_factor<'a>(
+    images: impl IntoIterator<Item = &'a Image<u16>>,
+    depth_factor: f64,
+) -> Result<DepthStatistics> {
+    let Some(statistics) = DepthStatistics::of(images, depth_factor) else {
+        return Err(Error::argument("the first depth images hold no measurement", "check the depth sensor"));
+    };
+    if PLAUSIBLE_MEDIAN_M.contains(&statistics.median_m) {
+        return Ok(statistics);
+    }
+    let median_m = statistics.median_m;
+    let problem = format!("with the depth factor {depth_factor} the median depth is {} m", significant(median_m));
+    let median_raw = median_m * depth_factor;
+    let fits = COMMON_FACTORS.iter().map(|factor| (factor, median_raw / factor));
+    let suggestions: Vec<_> = fits
+        .filter(|(_, median_m)| LIKELY_MEDIAN_M.contains(median_m))
+        .map(|(factor, median_m)| format!("with --depth-factor {factor} it would be {} m", significant(median_m)))
+        .collect();
+    let cure = match suggestions.as_slice() {
+        [] => format!("the raw median is {median_raw:.0}; give the depth units per metre of this recording"),
+        _ => suggestions.join(", "),
+    };
+    Err(Error::argument(problem, cure))
+}
+
+/// Decodes the first usable frames of `sequence` and checks `camera` against them: image size and depth factor.
+///
+/// # Errors
+/// None of the first frames can be used, for the reason that the message gives, or the depth factor is implausible.
+pub fn check_recording(sequence: &Sequence, camera: &Camera) -> Result<DepthStatistics> {
+    let first = sequence.entries.iter().take(PROBE_ATTEMPTS).cloned().collect();
+    let first = Sequence { entries: first, ..sequence.clone() };
+    let (mut depths, mut first_error) = (Vec::new(), None);
+    for frame in FrameStream::open(&first, camera, DEFAULT_LOOK_AHEAD)? {
+        match frame {
+            Ok(frame) => depths.push(frame.depth),
+            Err(error) => first_error = first_error.or(Some(error)),
+        }
+        if depths.len() == PROBE_FRAMES {
+            break;
+        }
+    }
+    match first_error {
+        Some(error) if depths.is_empty() => {
+            let problem = format!("none of the first {} frames can be used", first.entries.len());
+            Err(Error::content(&sequence.folder, problem, error.to_string()))
+        }
+        _ => check_depth_factor(depths.iter().map(|depth| &depth.raw), camera.depth_factor),
+    }
+}
+
+/// Two significant digits: 0.0014, 1.4, 71000.
+fn significant(value: f64) -> String {
+    let digits = if value > 0.0 { (1.0 - value.log10().floor()).clamp(0.0, 12.0) as usize } else { 1 };
+    format!("{value:.digits$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(values: &[u16]) -> Image<u16> {
+        Image::from_vec(values.len(), 1, values.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn quantiles_are_exact_over_measured_pixels_only() {
+        let mut values: Vec<u16> = (1..=100).map(|i| i * 10).collect();
+        values.extend([0; 100]);
+        let (front, back) = values.split_at(70);
+        let statistics = DepthStatistics::of([&image(front), &image(back)], 1000.0).unwrap();
+        assert_eq!(
+            (statistics.valid_share, statistics.p5_m, statistics.median_m, statistics.p95_m),
+            (0.5, 0.05, 0.5, 0.95)
+        );
+        assert_eq!(DepthStatistics::of([&image(&[0, 0])], 1000.0), None);
+        assert_eq!(DepthStatistics::of([], 1000.0), None);
+        assert_eq!(DepthStatistics::of([&image(&[65535])], 1.0).unwrap().p5_m, 65535.0);
+    }
+
+    #[test]
+    fn a_factor_that_cannot_be_is_refused_with_those_that_can() {
+        let refusal = |raw: u16, factor: f64| check_depth_factor([&image(&[raw])], factor).unwrap_err().to_string();
+        let error = refusal(1400, 50_000.0);
+        assert_eq!(
+            error,
+            "with the depth factor 50000 the median depth is 0.028 m; with --depth-factor 1000 it would be 1.4 m"
+        );
+        assert!(refusal(7000, 1.0).contains("with --depth-factor 5000 it would be 1.4 m"));
+        assert!(refusal(20, 1000.0).contains("the raw median is 20; give the depth units"));
+        assert!(check_depth_factor([&image(&[0])], 1000.0).unwrap_err().to_string().contains("no measurement"));
+        assert_eq!(check_depth_factor([&image(&[1400])], 1000.0).unwrap().median_m, 1.4);
+    }
+
+    #[test]
+    fn figures_have_two_significant_digits() {
+        assert_eq!(
+            [0.00142, 0.1, 1.44, 14.2, 71_000.0, 0.0].map(significant),
+            ["0.0014", "0.10", "1.4", "14", "71000", "0.0"]
+        );
+    }
+}

@@ -1,0 +1,136 @@
+//! `rgb.txt`, `depth.txt` (`stamp file`) and `associations.txt` (`stamp file stamp file`) as the TUM RGB-D benchmark defines them.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::text::content_lines;
+use crate::time::parse_stamp_ns;
+
+/// One image file of a list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ListedFile {
+    /// Time stamp, ns.
+    pub stamp_ns: i64,
+    /// The path as the list has it, relative to the folder of the list.
+    pub path: PathBuf,
+}
+
+/// Parses lines `stamp file`; the file name may hold blanks.
+///
+/// # Errors
+/// A malformed line, named by number and `source`.
+pub fn parse_file_list(text: &str, source: &Path) -> Result<Vec<ListedFile>> {
+    let mut files = Vec::new();
+    for (number, line) in content_lines(text) {
+        let Some((stamp, name)) = line.split_once(char::is_whitespace) else {
+            let problem = format!("'{line}' has one column");
+            return Err(Error::line(
+                source,
+                number,
+                problem,
+                "write 'stamp file', such as '1305031102.175304 rgb/1.png'",
+            ));
+        };
+        files.push(listed_file(stamp, name.trim(), source, number)?);
+    }
+    Ok(files)
+}
+
+/// Parses lines `stamp file stamp file` into pairs in the order of the columns.
+///
+/// # Errors
+/// A malformed line, named by number and `source`.
+pub fn parse_pair_list(text: &str, source: &Path) -> Result<Vec<[ListedFile; 2]>> {
+    let mut pairs = Vec::new();
+    for (number, line) in content_lines(text) {
+        let columns: Vec<&str> = line.split_whitespace().collect();
+        let [stamp_a, name_a, stamp_b, name_b] = columns[..] else {
+            let problem = format!("'{line}' has {} columns, not 4", columns.len());
+            return Err(Error::line(source, number, problem, "write 'stamp rgb-file stamp depth-file'"));
+        };
+        pairs.push([listed_file(stamp_a, name_a, source, number)?, listed_file(stamp_b, name_b, source, number)?]);
+    }
+    Ok(pairs)
+}
+
+fn listed_file(stamp: &str, name: &str, source: &Path, line: usize) -> Result<ListedFile> {
+    let stamp_ns = parse_stamp_ns(stamp).map_err(|error| {
+        Error::line(
+            source,
+            line,
+            format!("stamp '{stamp}' {error}"),
+            "write stamps as decimal seconds, such as 1305031102.175304",
+        )
+    })?;
+    Ok(ListedFile { stamp_ns, path: name.into() })
+}
+
+/// Whether the second column of files is the colour image, judged by names such as `depth/…` and `rgb/…`; `None` if they don't tell.
+pub fn color_is_second(pairs: &[[ListedFile; 2]]) -> Option<bool> {
+    pairs.iter().find_map(|[a, b]| match (names_depth(&a.path), names_depth(&b.path)) {
+        (Some(a), Some(b)) if a == b => None,
+        (Some(first_is_depth), _) => Some(first_is_depth),
+        (None, Some(second_is_depth)) => Some(!second_is_depth),
+        (None, None) => None,
+    })
+}
+
+/// `Some(true)` for a depth image, `Some(false)` for a colour image, by the words in its path.
+fn names_depth(path: &Path) -> Option<bool> {
+    let name = path.to_string_lossy().to_lowercase();
+    if name.contains("depth") {
+        return Some(true);
+    }
+    ["rgb", "color", "colour", "image"].iter().any(|word| name.contains(word)).then_some(false)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn list(text: &str) -> Result<Vec<ListedFile>> {
+        parse_file_list(text, Path::new("rgb.txt"))
+    }
+
+    fn pairs(text: &str) -> Result<Vec<[ListedFile; 2]>> {
+        parse_pair_list(text, Path::new("associations.txt"))
+    }
+
+    #[test]
+    fn a_list_tolerates_comments_crlf_tabs_and_blanks_in_names() {
+        let files = list("# color images\r\n\r\n1.5\trgb/1.png\r\n  2.25   rgb/my file.png  \r\n").unwrap();
+        assert_eq!(files[0], ListedFile { stamp_ns: 1_500_000_000, path: "rgb/1.png".into() });
+        assert_eq!(files[1], ListedFile { stamp_ns: 2_250_000_000, path: "rgb/my file.png".into() });
+    }
+
+    #[test]
+    fn a_malformed_line_is_named_with_its_number_and_value() {
+        let error = list("1.0 a.png\n# x\nnot-a-number b.png\n").unwrap_err().to_string();
+        assert!(error.contains("rgb.txt:3") && error.contains("not-a-number"), "{error}");
+        let error = list("1.0\n").unwrap_err().to_string();
+        assert!(error.contains("rgb.txt:1") && error.contains("one column"), "{error}");
+        let error = list("1305031102175304000 a.png").unwrap_err().to_string();
+        assert!(error.contains("nanoseconds"), "{error}");
+        let error = pairs("1 a 2\n").unwrap_err().to_string();
+        assert!(error.contains("associations.txt:1") && error.contains("3 columns"), "{error}");
+    }
+
+    #[test]
+    fn the_colour_column_is_found_by_the_names() {
+        assert_eq!(color_is_second(&pairs("1 rgb/1.png 1 depth/1.png").unwrap()), Some(false));
+        assert_eq!(color_is_second(&pairs("1 depth/1.png 1 rgb/1.png").unwrap()), Some(true));
+        assert_eq!(color_is_second(&pairs("1 a.png 1 b_depth.png").unwrap()), Some(false));
+        assert_eq!(color_is_second(&pairs("1 a.png 1 COLOR/b.png").unwrap()), Some(true));
+        assert_eq!(color_is_second(&pairs("1 a.png 1 b.png").unwrap()), None);
+        assert_eq!(color_is_second(&pairs("1 rgbd/depth/1.png 1 rgbd/rgb/1.png").unwrap()), Some(true));
+    }
+
+    proptest! {
+        #[test]
+        fn lists_of_arbitrary_text_never_panic(text in "([0-9. \t\r\n#a-z/-]|.){0,200}") {
+            let _ = list(&text);
+            let _ = pairs(&text).map(|pairs| color_is_second(&pairs));
+        }
+    }
+}

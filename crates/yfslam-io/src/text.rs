@@ -1,0 +1,59 @@
+//! Text files as numbered lines of content: comments, blank lines, byte-order mark and CRLF are gone.
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+
+/// Largest file read whole, bytes. A day of poses at 30 Hz or a 60-megapixel PNG fit; a device that never ends does not.
+pub const MAX_FILE_BYTES: u64 = 400 << 20;
+
+/// Reads a whole regular file into `bytes`, whose old content is dropped.
+pub fn read_bytes(path: &Path, bytes: &mut Vec<u8>) -> std::io::Result<()> {
+    bytes.clear();
+    let metadata = fs::metadata(path)?;
+    if metadata.is_dir() {
+        return Err(std::io::ErrorKind::IsADirectory.into());
+    }
+    if !metadata.is_file() || metadata.len() > MAX_FILE_BYTES {
+        return Err(std::io::Error::other(format!("not a regular file of at most {} MiB", MAX_FILE_BYTES >> 20)));
+    }
+    File::open(path)?.take(MAX_FILE_BYTES).read_to_end(bytes)?;
+    Ok(())
+}
+
+/// Reads a UTF-8 text file.
+pub fn read_text(path: &Path) -> Result<String> {
+    let mut bytes = Vec::new();
+    read_bytes(path, &mut bytes).map_err(|source| Error::read(path, source))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        Error::content(path, format!("is not UTF-8 text (byte {offset})"), "save it as UTF-8 text")
+    })
+}
+
+/// Lines that hold something, trimmed, with their numbers from 1. Lines that start with `#` are comments.
+pub fn content_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let numbered = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
+    numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_blank_lines_bom_and_crlf_are_skipped_and_numbers_kept() {
+        let text = "\u{feff}# head\r\n\r\n 1\ta \r\n#x\r\n2 b";
+        assert_eq!(content_lines(text).collect::<Vec<_>>(), [(3, "1\ta"), (5, "2 b")]);
+    }
+
+    #[test]
+    fn a_folder_or_a_device_is_not_read_as_a_file() {
+        let mut bytes = Vec::new();
+        assert!(read_bytes(Path::new("/dev/zero"), &mut bytes).is_err());
+        assert!(read_bytes(Path::new("/"), &mut bytes).is_err());
+    }
+}

@@ -1,0 +1,78 @@
+//! Point clouds as binary little-endian PLY (G. Turk, Stanford, 1994), which MeshLab, CloudCompare and Open3D read.
+
+use std::io;
+use std::path::Path;
+
+use crate::error::Result;
+use crate::write::write_atomically;
+
+/// A coloured point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlyPoint {
+    /// Position, m.
+    pub position_m: [f32; 3],
+    /// Red, green, blue.
+    pub color: [u8; 3],
+}
+
+/// Writes `points` as PLY.
+///
+/// # Errors
+/// The file cannot be written, or a position is not finite.
+pub fn write_ply<I>(path: &Path, points: I) -> Result<()>
+where
+    I: IntoIterator<Item = PlyPoint, IntoIter: ExactSizeIterator>,
+{
+    let points = points.into_iter();
+    write_atomically(path, |writer| {
+        write!(
+            writer,
+            "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+             property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+            points.len()
+        )?;
+        for PlyPoint { position_m: [x, y, z], color: [r, g, b] } in points {
+            if !(x.is_finite() && y.is_finite() && z.is_finite()) {
+                return Err(io::Error::new(io::ErrorKind::InvalidData, format!("point ({x}, {y}, {z}) is not finite")));
+            }
+            let ([x0, x1, x2, x3], [y0, y1, y2, y3], [z0, z1, z2, z3]) =
+                (x.to_le_bytes(), y.to_le_bytes(), z.to_le_bytes());
+            writer.write_all(&[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3, r, g, b])?;
+        }
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_packed_behind_a_header_that_counts_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cloud.ply");
+        let points = [
+            PlyPoint { position_m: [1.0, -2.5, 0.125], color: [1, 2, 3] },
+            PlyPoint { position_m: [0.0, 0.0, 4.0], color: [255, 0, 7] },
+        ];
+        write_ply(&path, points).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let end = b"end_header\n";
+        let header = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+        assert!(std::str::from_utf8(&bytes[..header]).unwrap().contains("element vertex 2\n"));
+        assert_eq!(bytes.len() - header, 2 * 15);
+        assert_eq!(bytes[header + 4..header + 8], (-2.5f32).to_le_bytes());
+        assert_eq!(bytes[header + 12..header + 15], [1, 2, 3]);
+        assert_eq!(bytes[bytes.len() - 3..], [255, 0, 7]);
+    }
+
+    #[test]
+    fn a_point_that_is_not_finite_is_refused_and_nothing_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cloud.ply");
+        let error =
+            write_ply(&path, [PlyPoint { position_m: [f32::NAN, 0.0, 0.0], color: [0; 3] }]).unwrap_err().to_string();
+        assert!(error.contains("cloud.ply") && error.contains("not finite"), "{error}");
+        assert!(!path.exists());
+    }
+}

@@ -1,0 +1,243 @@
+//! Camera paths after the TUM freiburg3 sequences: key poses joined by minimum-jerk moves, plus hand shake.
+//!
+//! In: motion, seed and time. Out: the camera's pose in the world. Moves follow s(τ) = 10τ³ − 15τ⁴ + 6τ⁵ (Flash and Hogan,
+//! "The coordination of arm movements", 1985), so that velocity and acceleration are continuous everywhere; each lasts
+//! as long as its length asks for at the recording's mean speed.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::config::CameraMotion;
+use crate::rng::Rng;
+
+/// Mean speed of walking_xyz: 5.79 m in 28.8 s.
+const XYZ_SPEED: f64 = 5.79 / 28.8;
+/// Mean speed of walking_halfsphere: 7.69 m in 35.8 s.
+const HALFSPHERE_SPEED: f64 = 7.69 / 35.8;
+/// Radius of the half sphere, m; "approximately one metre diameter" on the benchmark's page.
+const HALFSPHERE_RADIUS: f64 = 0.55;
+/// Mean turning rate of walking_rpy, rad/s (20.9°/s on the benchmark's page).
+const RPY_RATE: f64 = 0.365;
+/// Distance of the camera in front of the point it is turned about (a little below it), m: gives rpy its 2.70 m in 30.6 s.
+const RPY_LEVER: f64 = 0.353;
+/// Amplitude of the hand shake per sine and axis, m and rad; gives walking_static its 0.28 m in 24.8 s.
+const SHAKE_M: f64 = 0.000_935;
+const SHAKE_RAD: f64 = 0.0008;
+
+/// Coordinates of a key pose: what they mean depends on the motion.
+type Key = Vector3<f64>;
+
+/// A camera path.
+#[derive(Clone, Debug)]
+pub struct CameraPath {
+    motion: CameraMotion,
+    base: Isometry3<f64>,
+    /// Start times of the moves, s; move k leads from key k to key k + 1 (the last back to key 0).
+    starts: Vec<f64>,
+    keys: Vec<Key>,
+    period: f64,
+    /// Per axis (three of translation, three of rotation), three sines: amplitude, angular frequency, phase.
+    shake: [[[f64; 3]; 3]; 6],
+}
+
+/// The pose of a camera at `eye` that looks at `target` with the horizon level.
+pub fn look_at(eye: Point3<f64>, target: Point3<f64>) -> Isometry3<f64> {
+    let forward = (target - eye).normalize();
+    let right = forward.cross(&Vector3::z()).normalize();
+    let down = forward.cross(&right);
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[right, down, forward]));
+    Isometry3::from_parts(Translation3::from(eye.coords), UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+impl CameraPath {
+    /// A path around the pose `base` (world from camera).
+    pub fn new(motion: CameraMotion, base: Isometry3<f64>, hand_shake: f64, seed: u64) -> Self {
+        let mut rng = Rng::new(seed, 0xca);
+        let keys = keys(motion, &mut rng);
+        let mut path = Self { motion, base, starts: Vec::new(), keys, period: 0.0, shake: shake(hand_shake, &mut rng) };
+        for k in 0..path.keys.len() {
+            path.starts.push(path.period);
+            path.period += path.duration(k);
+        }
+        path
+    }
+
+    /// World from camera at `time` seconds.
+    pub fn pose(&self, time: f64) -> Isometry3<f64> {
+        let [x, y, z, roll, pitch, yaw] = self.shake.map(|sines| {
+            sines.iter().map(|[amplitude, omega, phase]| amplitude * (omega * time + phase).sin()).sum::<f64>()
+        });
+        let shake = Isometry3::new(Vector3::new(x, y, z), Vector3::new(pitch, yaw, roll));
+        self.base * self.local(&self.coordinates(time)) * shake
+    }
+
+    fn coordinates(&self, time: f64) -> Key {
+        if self.period <= 0.0 {
+            return Key::zeros();
+        }
+        let t = time.rem_euclid(self.period);
+        let k = self.starts.partition_point(|&start| start <= t).saturating_sub(1);
+        let end = self.starts.get(k + 1).copied().unwrap_or(self.period);
+        let s = minimum_jerk((t - self.starts[k]) / (end - self.starts[k]));
+        self.key(k) * (1.0 - s) + self.key(k + 1) * s
+    }
+
+    fn key(&self, k: usize) -> Key {
+        self.keys[k % self.keys.len()]
+    }
+
+    /// Camera pose relative to the base for the given coordinates; camera axes are right, down, forward.
+    fn local(&self, c: &Key) -> Isometry3<f64> {
+        match self.motion {
+            CameraMotion::Static => Isometry3::identity(),
+            CameraMotion::Xyz => Isometry3::translation(c.x, c.y, c.z),
+            CameraMotion::Rpy => {
+                let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), c.z)
+                    * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), c.y)
+                    * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), c.x);
+                around(Vector3::new(0.0, 0.3 * RPY_LEVER, -RPY_LEVER), turn)
+            }
+            CameraMotion::Halfsphere => {
+                let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), c.x)
+                    * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), c.y);
+                around(Vector3::new(0.0, 0.0, HALFSPHERE_RADIUS), turn)
+            }
+        }
+    }
+
+    /// Duration of move k, s.
+    fn duration(&self, k: usize) -> f64 {
+        let (from, to) = (self.key(k), self.key(k + 1));
+        let steps = 32;
+        let poses: Vec<Isometry3<f64>> =
+            (0..=steps).map(|i| self.local(&from.lerp(&to, f64::from(i) / f64::from(steps)))).collect();
+        let sum = |f: &dyn Fn(&Isometry3<f64>, &Isometry3<f64>) -> f64| -> f64 {
+            poses.windows(2).map(|pair| f(&pair[0], &pair[1])).sum()
+        };
+        let length = sum(&|a, b| (a.translation.vector - b.translation.vector).norm());
+        match self.motion {
+            CameraMotion::Static => 0.0,
+            CameraMotion::Xyz => length / XYZ_SPEED,
+            CameraMotion::Rpy => sum(&|a, b| a.rotation.angle_to(&b.rotation)) / RPY_RATE,
+            CameraMotion::Halfsphere => length / HALFSPHERE_SPEED,
+        }
+    }
+}
+
+/// Rotation by `turn` about the point `pivot`.
+fn around(pivot: Vector3<f64>, turn: UnitQuaternion<f64>) -> Isometry3<f64> {
+    Translation3::from(pivot) * turn * Translation3::from(-pivot)
+}
+
+fn minimum_jerk(t: f64) -> f64 {
+    t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
+}
+
+/// Key poses of one round, with a little variation by the seed; three rounds differ, then the path repeats.
+fn keys(motion: CameraMotion, rng: &mut Rng) -> Vec<Key> {
+    let mut keys = Vec::new();
+    for _ in 0..3 {
+        let mut near = |x: f64| x * rng.range64(0.85, 1.15);
+        match motion {
+            CameraMotion::Static => {}
+            CameraMotion::Xyz => {
+                // Two strokes along each axis: right and left, down and up, forward and back.
+                for (axis, reach) in [(0, 0.38), (1, 0.24), (2, 0.30)] {
+                    for side in [1.0, -1.0, 1.0, -1.0] {
+                        let mut key = Key::zeros();
+                        key[axis] = near(side * reach);
+                        keys.push(key);
+                    }
+                    keys.push(Key::zeros());
+                }
+            }
+            CameraMotion::Rpy => {
+                for (axis, reach) in [(0, 0.42), (1, 0.30), (2, 0.40)] {
+                    for side in [1.0, -1.0, 1.0, -1.0] {
+                        let mut key = Key::zeros();
+                        key[axis] = near(side * reach);
+                        keys.push(key);
+                    }
+                    keys.push(Key::zeros());
+                }
+            }
+            CameraMotion::Halfsphere => {
+                // Azimuth to the right, elevation up (a negative turn about the camera's x axis).
+                for (azimuth, elevation) in
+                    [(0.7, 0.0), (0.45, -0.5), (0.0, -0.75), (-0.5, -0.45), (-0.75, 0.05), (-0.3, 0.2), (0.0, -0.35)]
+                {
+                    keys.push(Key::new(near(azimuth), near(elevation), 0.0));
+                }
+                keys.push(Key::zeros());
+            }
+        }
+    }
+    keys
+}
+
+fn shake(strength: f64, rng: &mut Rng) -> [[[f64; 3]; 3]; 6] {
+    std::array::from_fn(|axis| {
+        let amplitude = strength * if axis < 3 { SHAKE_M } else { SHAKE_RAD };
+        // Slow sway, wrist, and a trace of tremor; incommensurate by their random part.
+        [(0.35, 2.2), (1.3, 1.0), (4.1, 0.18)].map(|(hertz, weight)| {
+            // A faster sine is smaller, so that the path length does not depend on the draw.
+            let detune = rng.range64(0.85, 1.15);
+            let omega = std::f64::consts::TAU * hertz * detune;
+            [amplitude * weight / detune, omega, rng.range64(0.0, std::f64::consts::TAU)]
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn path(motion: CameraMotion, seed: u64) -> CameraPath {
+        CameraPath::new(motion, look_at(Point3::new(0.0, -1.7, 1.35), Point3::new(0.0, 1.2, 0.9)), 1.0, seed)
+    }
+
+    fn length(path: &CameraPath, seconds: f64) -> f64 {
+        let poses: Vec<_> = (0..(seconds * 30.0) as usize).map(|i| path.pose(i as f64 / 30.0)).collect();
+        poses.windows(2).map(|p| (p[0].translation.vector - p[1].translation.vector).norm()).sum()
+    }
+
+    #[test]
+    fn path_lengths_are_those_of_the_recordings_within_four_percent() {
+        for seed in 0..5 {
+            for (motion, seconds, metres) in [
+                (CameraMotion::Static, 24.8, 0.28),
+                (CameraMotion::Xyz, 28.8, 5.79),
+                (CameraMotion::Rpy, 30.6, 2.70),
+                (CameraMotion::Halfsphere, 35.8, 7.69),
+            ] {
+                let got = length(&path(motion, seed), seconds);
+                assert!((got / metres - 1.0).abs() < 0.04, "{motion:?} seed {seed}: {got} m instead of {metres} m");
+            }
+        }
+    }
+
+    #[test]
+    fn acceleration_never_jumps() {
+        for (_, motion) in CameraMotion::ALL {
+            let path = path(motion, 1);
+            let h = 1e-3;
+            let acceleration = |t: f64| {
+                let p = |t| path.pose(t).translation.vector;
+                (p(t + h) - 2.0 * p(t) + p(t - h)) / (h * h)
+            };
+            let jumps = (1..30_000).map(|i| {
+                let t = f64::from(i) * h;
+                (acceleration(t + h) - acceleration(t)).norm()
+            });
+            let largest = jumps.fold(0.0, f64::max);
+            // A step in acceleration would show at any time step; here jerk times one millisecond is the most.
+            assert!(largest < 0.05, "{motion:?}: acceleration jumps by {largest} m/s²");
+        }
+    }
+
+    #[test]
+    fn a_camera_looks_along_its_z_axis_with_y_down() {
+        let pose = look_at(Point3::new(0.0, -2.0, 1.0), Point3::new(0.0, 3.0, 1.0));
+        assert!((pose * Vector3::z() - Vector3::y()).norm() < 1e-12);
+        assert!((pose * Vector3::y() + Vector3::z()).norm() < 1e-12);
+    }
+}

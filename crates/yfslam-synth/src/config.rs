@@ -1,0 +1,276 @@
+//! What a synthetic sequence is made of. Everything has a default; unknown keys are refused.
+
+use serde::{Deserialize, Serialize};
+use yfslam::Camera;
+
+/// How the camera is moved, after the freiburg3 sequences of the TUM RGB-D benchmark (Sturm et al., IROS 2012).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CameraMotion {
+    /// Held still by hand: 0.28 m in 24.8 s, all of it hand shake.
+    Static,
+    /// Along the three axes in turn, orientation kept: 5.79 m in 28.8 s.
+    Xyz,
+    /// Turned about roll, pitch and yaw: 2.70 m in 30.6 s, 21°/s.
+    Rpy,
+    /// On a half sphere, looking at its centre: 7.69 m in 35.8 s.
+    Halfsphere,
+}
+
+impl CameraMotion {
+    /// All motions with their names in specs.
+    pub const ALL: [(&str, Self); 4] =
+        [("static", Self::Static), ("xyz", Self::Xyz), ("rpy", Self::Rpy), ("halfsphere", Self::Halfsphere)];
+}
+
+/// What the people do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Activity {
+    /// They walk around the desk, stop, turn and walk on.
+    Walking,
+    /// They sit (or stand, once the chairs are taken) and gesture a little.
+    Sitting,
+}
+
+impl Activity {
+    /// All activities with their names in specs.
+    pub const ALL: [(&str, Self); 2] = [("sitting", Self::Sitting), ("walking", Self::Walking)];
+}
+
+/// Where it happens.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SceneKind {
+    /// An office of 6.4 m × 6 m with a desk in the middle.
+    #[default]
+    Office,
+}
+
+/// A synthetic sequence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WorldConfig {
+    /// Where it happens.
+    pub scene: SceneKind,
+    /// How the camera moves.
+    pub motion: CameraMotion,
+    /// What the people do.
+    pub activity: Activity,
+    /// Number of people, 0 to 6.
+    pub people: usize,
+    /// Mean share of the picture that walking people cover, 0 to 0.6. Their way is led nearer to or farther from the
+    /// camera to meet it; [`World::person_share`](crate::World::person_share) tells what was reached.
+    pub person_share: f64,
+    /// Number of frames.
+    pub frames: usize,
+    /// Seed of textures, people, paths and noise.
+    pub seed: u64,
+    /// The camera that is rendered, lens distortion included. Its `fps` is the frame rate, its `depth_factor` the unit
+    /// of depth, its `bf` the baseline of the depth sensor.
+    pub camera: Camera,
+    /// Strength of the hand shake; 1 has the path length of `walking_static`, 0 none.
+    pub hand_shake: f64,
+    /// Light and its quality.
+    pub light: LightConfig,
+    /// What the sensor adds to the exact picture.
+    pub sensor: SensorConfig,
+    /// Whether frames carry the exact boxes of visible people as detections.
+    pub detections: bool,
+    /// Least number of visible pixels for a box, at 640 × 480; scales with the image area.
+    pub min_person_px: usize,
+    /// Whether object edges are smoothed (four samples per edge pixel).
+    pub antialias: bool,
+}
+
+impl Default for WorldConfig {
+    fn default() -> Self {
+        Self {
+            scene: SceneKind::Office,
+            motion: CameraMotion::Xyz,
+            activity: Activity::Walking,
+            people: 2,
+            person_share: 0.2,
+            frames: 300,
+            seed: 1,
+            camera: default_camera(),
+            hand_shake: 1.0,
+            light: LightConfig::default(),
+            sensor: SensorConfig::default(),
+            detections: false,
+            min_person_px: 400,
+            antialias: true,
+        }
+    }
+}
+
+/// The calibration of freiburg3 as the TUM benchmark's web page gives it: no distortion.
+pub fn default_camera() -> Camera {
+    Camera {
+        width: 640,
+        height: 480,
+        fx: 535.4,
+        fy: 539.2,
+        cx: 320.1,
+        cy: 247.6,
+        distortion: [0.0; 5],
+        depth_factor: 5000.0,
+        fps: 30.0,
+        bf: 40.0,
+    }
+}
+
+/// Light and its quality.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LightConfig {
+    /// Shadow rays per lamp and light-map texel, twice as many for ambient light; 0 lights without shadows.
+    pub shadow_rays: usize,
+    /// Whether moving people darken the floor and furniture around them.
+    pub moving_shadows: bool,
+    /// Brightness of the picture; 1 suits the office.
+    pub exposure: f32,
+}
+
+impl Default for LightConfig {
+    fn default() -> Self {
+        Self { shadow_rays: 12, moving_shadows: true, exposure: 1.0 }
+    }
+}
+
+/// What the sensor adds to the exact picture. Each part has its own switch: a zero (or `false`) turns it off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SensorConfig {
+    /// Standard deviation of colour noise, grey levels of 255.
+    pub color_noise: f32,
+    /// Depth noise independent of distance, m: the first term of σ_z = a + b (z − 0.4 m)² (Nguyen, Izadi and Lovell,
+    /// "Modeling Kinect sensor noise for improved 3D reconstruction and tracking", 3DIMPVT 2012, eq. 3: a = 0.0012 m).
+    pub depth_noise_m: f32,
+    /// Depth noise that grows with distance, 1/m: the second term there (b = 0.0019 /m).
+    pub depth_noise_growth: f32,
+    /// Step of the disparity in px of a structured-light sensor (1/8 for the Kinect: Khoshelham and Elberink,
+    /// Sensors 2012, section 3); the depth step is z² · step / bf.
+    pub disparity_step_px: f32,
+    /// Whether places that the projector cannot see, and depth edges, have no depth.
+    pub holes: bool,
+    /// Nearest depth that is measured, m.
+    pub min_depth_m: f32,
+    /// Farthest depth that is measured, m.
+    pub max_depth_m: f32,
+}
+
+impl Default for SensorConfig {
+    fn default() -> Self {
+        Self {
+            color_noise: 1.5,
+            depth_noise_m: 0.0012,
+            depth_noise_growth: 0.0019,
+            disparity_step_px: 0.125,
+            holes: true,
+            min_depth_m: 0.4,
+            max_depth_m: 5.0,
+        }
+    }
+}
+
+impl SensorConfig {
+    /// The perfect sensor: no noise, no holes, depth of everything, rounded to the camera's unit only.
+    pub fn perfect() -> Self {
+        Self {
+            color_noise: 0.0,
+            depth_noise_m: 0.0,
+            depth_noise_growth: 0.0,
+            disparity_step_px: 0.0,
+            holes: false,
+            min_depth_m: 0.0,
+            max_depth_m: f32::INFINITY,
+        }
+    }
+}
+
+/// Why a world cannot be made.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum WorldError {
+    /// A value outside its range.
+    #[error("the synthetic world's `{name}` is {value}; it must be {range}")]
+    OutOfRange {
+        /// Name of the field.
+        name: &'static str,
+        /// The value found.
+        value: String,
+        /// What is allowed.
+        range: &'static str,
+    },
+    /// A spec that cannot be read.
+    #[error("`{spec}` does not name a synthetic world: {reason}")]
+    Spec {
+        /// The text that was given.
+        spec: String,
+        /// What is wrong and what would be right.
+        reason: String,
+    },
+}
+
+/// Greatest number of people.
+pub const MAX_PEOPLE: usize = 6;
+
+impl WorldConfig {
+    /// Refuses values that no world can be made of.
+    pub(crate) fn validate(&self) -> Result<(), WorldError> {
+        let camera = &self.camera;
+        let size = 16..=4096;
+        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
+        check(self.people <= MAX_PEOPLE, "people", self.people, "between 0 and 6")?;
+        check((0.0..=0.6).contains(&self.person_share), "person_share", self.person_share, "between 0 and 0.6")?;
+        check((1..=1_000_000).contains(&self.frames), "frames", self.frames, "between 1 and 1000000")?;
+        check(size.contains(&camera.width), "camera.width", camera.width, "between 16 and 4096 px")?;
+        check(size.contains(&camera.height), "camera.height", camera.height, "between 16 and 4096 px")?;
+        check(camera.fx.is_finite() && camera.fx > 1.0, "camera.fx", camera.fx, "greater than 1 px")?;
+        check(camera.fy.is_finite() && camera.fy > 1.0, "camera.fy", camera.fy, "greater than 1 px")?;
+        check(finite(&[camera.cx, camera.cy]), "camera.cx, camera.cy", camera.cx, "finite")?;
+        check(finite(&camera.distortion), "camera.distortion", format!("{:?}", camera.distortion), "finite")?;
+        check((1e-3..=1e3).contains(&camera.fps), "camera.fps", camera.fps, "between 0.001 and 1000 Hz")?;
+        let factor = camera.depth_factor;
+        check((1.0..=1e6).contains(&factor), "camera.depth_factor", factor, "between 1 and 1000000 units per metre")?;
+        check(camera.bf.is_finite() && camera.bf >= 0.0, "camera.bf", camera.bf, "at least 0 px·m")?;
+        check((0.0..=20.0).contains(&self.hand_shake), "hand_shake", self.hand_shake, "between 0 and 20")?;
+        let light = &self.light;
+        check(light.shadow_rays <= 1024, "light.shadow_rays", light.shadow_rays, "at most 1024")?;
+        check((0.0..=100.0).contains(&light.exposure), "light.exposure", light.exposure, "between 0 and 100")?;
+        let s = &self.sensor;
+        for (name, value) in [
+            ("sensor.color_noise", s.color_noise),
+            ("sensor.depth_noise_m", s.depth_noise_m),
+            ("sensor.depth_noise_growth", s.depth_noise_growth),
+            ("sensor.disparity_step_px", s.disparity_step_px),
+        ] {
+            check((0.0..=100.0).contains(&value), name, value, "between 0 and 100")?;
+        }
+        check(s.min_depth_m >= 0.0, "sensor.min_depth_m", s.min_depth_m, "at least 0 m")?;
+        check(s.max_depth_m > s.min_depth_m, "sensor.max_depth_m", s.max_depth_m, "greater than sensor.min_depth_m")
+    }
+}
+
+fn check(good: bool, name: &'static str, value: impl ToString, range: &'static str) -> Result<(), WorldError> {
+    if good { Ok(()) } else { Err(WorldError::OutOfRange { name, value: value.to_string(), range }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_survives_a_round_trip_through_toml_and_unknown_keys_are_refused() {
+        let text = toml::to_string(&WorldConfig::default()).unwrap();
+        assert_eq!(toml::from_str::<WorldConfig>(&text).unwrap(), WorldConfig::default());
+        let error = toml::from_str::<WorldConfig>("poeple = 3").unwrap_err().to_string();
+        assert!(error.contains("poeple"), "{error}");
+    }
+
+    #[test]
+    fn a_bad_value_is_named_with_its_range() {
+        let error = WorldConfig { people: 7, ..Default::default() }.validate().unwrap_err().to_string();
+        assert_eq!(error, "the synthetic world's `people` is 7; it must be between 0 and 6");
+    }
+}

@@ -1,0 +1,164 @@
+//! The way someone walks: a closed smooth round with stops.
+//!
+//! In: way-points, a speed and a phase. Out: position, heading, distance walked and speed at any time. The round is a
+//! closed Catmull–Rom spline, walked by arc length; between stops the speed follows a minimum-jerk profile with a plateau.
+
+use crate::rng::Rng;
+
+/// A closed round.
+#[derive(Clone, Debug)]
+pub struct Walkway {
+    /// Points on the round, closely spaced, and the arc length up to each; the first point is repeated at the end.
+    points: Vec<[f64; 2]>,
+    arc: Vec<f64>,
+    legs: Vec<Leg>,
+    period: f64,
+    phase: f64,
+    clockwise: bool,
+}
+
+/// A walk between two stops, and the stop at its end.
+#[derive(Clone, Copy, Debug)]
+struct Leg {
+    start_time: f64,
+    walk_time: f64,
+    start_arc: f64,
+    length: f64,
+    /// Where one looks while standing, relative to the direction of the way, rad.
+    glance: f64,
+    pause: f64,
+}
+
+/// Where a walker is.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// Position on the floor, m.
+    pub position: [f64; 2],
+    /// Direction of the body: angle about +z from +y, rad.
+    pub heading: f64,
+    /// Distance walked since the start of the round, m.
+    pub distance: f64,
+    /// Speed, m/s.
+    pub speed: f64,
+}
+
+const SAMPLES_PER_SPAN: usize = 24;
+
+impl Walkway {
+    /// A round through `waypoints` at about `speed` m/s, `phase` (0 to 1) of a round ahead, with stops drawn from `rng`.
+    pub fn new(waypoints: &[[f64; 2]], speed: f64, phase: f64, clockwise: bool, rng: &mut Rng) -> Self {
+        let n = waypoints.len() as isize;
+        let at = |i: isize| waypoints[i.rem_euclid(n) as usize];
+        let mut points = Vec::new();
+        for i in 0..n {
+            for step in 0..SAMPLES_PER_SPAN {
+                let t = step as f64 / SAMPLES_PER_SPAN as f64;
+                points.push(catmull_rom([at(i - 1), at(i), at(i + 1), at(i + 2)], t));
+            }
+        }
+        points.extend(points.first().copied());
+        let mut arc = vec![0.0];
+        for pair in points.windows(2) {
+            arc.push(arc[arc.len() - 1] + distance(pair[0], pair[1]));
+        }
+        let total = arc[arc.len() - 1];
+        // Three legs a round; the stops are somewhere in the middle of each third.
+        let stops = [0.15, 0.5, 0.83].map(|share| total * (share + rng.range64(-0.08, 0.08)));
+        let mut legs = Vec::new();
+        let mut time = 0.0;
+        for k in 0..stops.len() {
+            let length = (stops[(k + 1) % stops.len()] - stops[k]).rem_euclid(total);
+            // The smooth profile's mean speed is 1/(1 - RAMP) below its plateau.
+            let walk_time = length / (speed * (1.0 - RAMP));
+            let (pause, glance) = (rng.range64(0.6, 2.2), rng.range64(-0.9, 0.9));
+            legs.push(Leg { start_time: time, walk_time, start_arc: stops[k], length, glance, pause });
+            time += walk_time + pause;
+        }
+        Self { points, arc, legs, period: time, phase: phase * time, clockwise }
+    }
+
+    /// Where the walker is at `time` seconds.
+    pub fn at(&self, time: f64) -> Step {
+        let t = (time + self.phase).rem_euclid(self.period);
+        let k = self.legs.partition_point(|leg| leg.start_time <= t).saturating_sub(1);
+        let leg = self.legs[k];
+        let walked = ((t - leg.start_time) / leg.walk_time).min(1.0);
+        let (share, rate) = profile(walked);
+        let arc = leg.start_arc + share * leg.length;
+        let rest = ((t - leg.start_time - leg.walk_time) / leg.pause).clamp(0.0, 1.0);
+        let glance = leg.glance * (std::f64::consts::PI * rest).sin().powi(2);
+        let (position, heading) = self.locate(arc);
+        Step { position, heading: heading + glance, distance: arc, speed: rate * leg.length / leg.walk_time }
+    }
+
+    fn locate(&self, arc: f64) -> ([f64; 2], f64) {
+        let total = self.arc[self.arc.len() - 1];
+        let along = if self.clockwise { total - arc.rem_euclid(total) } else { arc.rem_euclid(total) };
+        let position = self.point(along);
+        // The heading averages over 0.4 m: people turn before the bend.
+        let (a, b) = (self.point((along - 0.2).rem_euclid(total)), self.point((along + 0.2).rem_euclid(total)));
+        let sign = if self.clockwise { -1.0 } else { 1.0 };
+        let (dx, dy) = (sign * (b[0] - a[0]), sign * (b[1] - a[1]));
+        (position, (-dx).atan2(dy))
+    }
+
+    fn point(&self, along: f64) -> [f64; 2] {
+        let i = self.arc.partition_point(|&a| a <= along).clamp(1, self.arc.len() - 1);
+        let t = (along - self.arc[i - 1]) / (self.arc[i] - self.arc[i - 1]);
+        let (a, b) = (self.points[i - 1], self.points[i]);
+        [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t]
+    }
+}
+
+/// Share of a leg's time spent on speeding up, and as much on slowing down.
+const RAMP: f64 = 0.2;
+
+/// Share of the way and relative speed at share `t` of the time: speed rises as a smoothstep, stays, falls.
+fn profile(t: f64) -> (f64, f64) {
+    let top = 1.0 / (1.0 - RAMP);
+    let rising = |t: f64| {
+        let s = t / RAMP;
+        (top * RAMP * (s.powi(3) - 0.5 * s.powi(4)), top * s * s * (3.0 - 2.0 * s))
+    };
+    if t < RAMP {
+        rising(t)
+    } else if t <= 1.0 - RAMP {
+        (top * (t - RAMP / 2.0), top)
+    } else {
+        let (way, speed) = rising(1.0 - t);
+        (1.0 - way, speed)
+    }
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+fn catmull_rom(p: [[f64; 2]; 4], t: f64) -> [f64; 2] {
+    std::array::from_fn(|k| {
+        let [a, b, c, d] = p.map(|q| q[k]);
+        b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_walker_moves_without_jumps_at_the_stated_speed_and_stops() {
+        let round = [[2.0, 0.0], [0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]];
+        let walkway = Walkway::new(&round, 0.9, 0.3, true, &mut Rng::new(4, 0));
+        let h = 0.01;
+        let steps: Vec<Step> = (0..(2.0 * walkway.period / h) as usize).map(|i| walkway.at(i as f64 * h)).collect();
+        let speeds: Vec<f64> = steps.windows(2).map(|pair| distance(pair[0].position, pair[1].position) / h).collect();
+        let top = speeds.iter().copied().fold(0.0, f64::max);
+        assert!((0.85..1.0).contains(&top), "top speed {top}");
+        assert!(speeds.iter().any(|&s| s < 1e-6), "never stops");
+        for (pair, speed) in steps.windows(2).zip(&speeds) {
+            assert!((pair[0].speed - speed).abs() < 0.05, "{} is not {speed}", pair[0].speed);
+            let turn = (pair[1].heading - pair[0].heading).sin().abs();
+            assert!(turn < 0.06, "turns by {turn} rad in {h} s");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Visibility: which triangle each pixel sees, and at what depth.
+//!
+//! In: projected triangles and rays. Out: per pixel the inverse depth and the index of the nearest triangle. The image is
+//! cut into tiles; a tile keeps only triangles that can touch it, nearest first, and stops when it is covered. Bands of
+//! tiles run in parallel and write disjoint rows, so that the result does not depend on the number of threads.
+
+use rayon::prelude::*;
+
+use super::project::Projected;
+use super::rays::{RayTable, Rect, TILE};
+
+/// Triangle index of a pixel that sees nothing.
+pub const NOTHING: u32 = u32::MAX;
+
+/// Per-pixel visibility in rows of [`RayTable::stride`].
+#[derive(Clone, Debug, Default)]
+pub struct Visibility {
+    /// 1/z, 1/m; 0 where nothing is seen.
+    pub inverse_depth: Vec<f32>,
+    /// Index into the projected triangles, or [`NOTHING`].
+    pub triangle: Vec<u32>,
+}
+
+/// Finds the nearest triangle of every pixel.
+pub fn rasterise(rays: &RayTable, triangles: &[Projected]) -> Visibility {
+    let mut inverse_depth = vec![0.0; rays.x.len()];
+    let mut triangle = vec![NOTHING; rays.x.len()];
+    let band = TILE * rays.stride;
+    inverse_depth.par_chunks_mut(band).zip(triangle.par_chunks_mut(band)).enumerate().for_each(
+        |(index, (depths, ids))| {
+            let in_band: Vec<u32> = (0u32..)
+                .zip(triangles)
+                .filter(|(_, t)| t.bounds.overlaps(&rays.bands[index]))
+                .map(|(id, _)| id)
+                .collect();
+            let mut list = Vec::new();
+            for column in 0..rays.stride / TILE {
+                let tile = &rays.tiles[index * (rays.stride / TILE) + column];
+                candidates(tile, triangles, &in_band, &mut list);
+                draw_tile(rays, index, column, tile, triangles, &list, depths, ids);
+            }
+        },
+    );
+    Visibility { inverse_depth, triangle }
+}
+
+/// A triangle that may touch the tile, and the greatest inverse depth it can have there.
+type Candidate = (f32, u32);
+
+fn candidates(tile: &Rect, triangles: &[Projected], in_band: &[u32], list: &mut Vec<Candidate>) {
+    list.clear();
+    for &id in in_band {
+        let t = &triangles[id as usize];
+        if t.bounds.overlaps(tile) && t.edges.iter().all(|edge| tile.max_of(edge) >= 0.0) {
+            list.push((tile.max_of(&t.inverse_depth), id));
+        }
+    }
+    list.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+}
+
+#[allow(clippy::too_many_arguments)]
+fn draw_tile(
+    rays: &RayTable,
+    band: usize,
+    column: usize,
+    tile: &Rect,
+    triangles: &[Projected],
+    list: &[Candidate],
+    depths: &mut [f32],
+    ids: &mut [u32],
+) {
+    let across = rays.stride / TILE;
+    let (xs, ys) = (rays.x.as_chunks::<TILE>().0, rays.y.as_chunks::<TILE>().0);
+    let (depths, ids) = (depths.as_chunks_mut::<TILE>().0, ids.as_chunks_mut::<TILE>().0);
+    // Everything in the tile is at least this near once some triangle covers the whole tile.
+    let mut covered_from = 0.0;
+    for &(nearest, id) in list {
+        if nearest < covered_from {
+            break;
+        }
+        let t = &triangles[id as usize];
+        let covers = t.edges.iter().all(|edge| tile.min_of(edge) >= 0.0);
+        if covers {
+            covered_from = tile.min_of(&t.inverse_depth).max(covered_from);
+        }
+        for row in 0..TILE {
+            let local = row * across + column;
+            let global = band * TILE * across + local;
+            draw_row(t, id, &xs[global], &ys[global], &mut depths[local], &mut ids[local]);
+        }
+    }
+}
+
+/// One row of a tile; written without branches so that the compiler vectorises it.
+#[inline]
+fn draw_row(
+    t: &Projected,
+    id: u32,
+    xs: &[f32; TILE],
+    ys: &[f32; TILE],
+    depth: &mut [f32; TILE],
+    ids: &mut [u32; TILE],
+) {
+    for i in 0..TILE {
+        let at = |p: &[f32; 3]| p[0] * xs[i] + p[1] * ys[i] + p[2];
+        let w = at(&t.inverse_depth);
+        let hit = (at(&t.edges[0]) >= 0.0) & (at(&t.edges[1]) >= 0.0) & (at(&t.edges[2]) >= 0.0) & (w > depth[i]);
+        depth[i] = if hit { w } else { depth[i] };
+        ids[i] = if hit { id } else { ids[i] };
+    }
+}

@@ -1,0 +1,55 @@
+//! Places: a static mesh, its lights, where the camera stands and where people may be.
+
+pub mod builder;
+mod furniture;
+mod office;
+
+use nalgebra::{Isometry3, Point3};
+
+use crate::config::SceneKind;
+use crate::light::Lights;
+use crate::mesh::{Mesh, Vec3};
+use builder::Palette;
+
+/// A place where someone can sit.
+#[derive(Clone, Copy, Debug)]
+pub struct Seat {
+    /// Middle of the seat's top, m.
+    pub position: Vec3,
+    /// Direction the sitter faces: angle about +z from +y, rad.
+    pub heading: f32,
+}
+
+/// A place.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Everything that stands still.
+    pub mesh: Mesh,
+    /// Its textures; people add theirs.
+    pub palette: Palette,
+    /// Its lights.
+    pub lights: Lights,
+    /// World from camera at the start.
+    pub camera: Isometry3<f64>,
+    /// Middle of the walk around the furniture, m.
+    pub walk_center: Point3<f64>,
+    /// Half width of the walk in x, m.
+    pub walk_half_width: f64,
+    /// y of the far side of the walk, m.
+    pub walk_far_y: f64,
+    /// Range of y for the near side of the walk: closest to the camera first, m.
+    pub walk_near_y: [f64; 2],
+    /// Where people can sit.
+    pub seats: Vec<Seat>,
+    /// Where people can stand without being in the way: position on the floor and heading.
+    pub stands: Vec<Seat>,
+}
+
+impl Scene {
+    /// Builds a scene; the seed varies its prints and clutter.
+    pub fn new(kind: SceneKind, seed: u64) -> Self {
+        match kind {
+            SceneKind::Office => office::build(seed),
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! What surfaces are made of: each material paints its own, never repeating texture.
+//!
+//! In: a material, the surface's size and a seed. Out: a painted [`Canvas`]. Lengths inside are metres turned into
+//! texels, so that grain and print have their natural size.
+
+use super::canvas::Canvas;
+use super::noise::{cell, fractal};
+use super::{Color, print};
+use crate::rng::Rng;
+
+/// A kind of surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Material {
+    /// Speckled linoleum or carpet with worn patches.
+    Floor(Color),
+    /// Painted wall: roller marks, scuffs and small holes.
+    Plaster(Color),
+    /// Wood grain along the longer side.
+    Wood(Color),
+    /// Lacquered metal or plastic with scratches.
+    Plain(Color),
+    /// Acoustic ceiling tiles.
+    Ceiling,
+    /// A printed poster: title, pictures, diagrams, text.
+    Poster,
+    /// A sheet of printed paper.
+    Paper,
+    /// The front of a book.
+    Cover(Color),
+    /// The spine of a book.
+    Spine(Color),
+    /// Cut pages of a book.
+    Pages,
+    /// A cardboard box with label and tape.
+    Cardboard,
+    /// A computer screen with windows full of text and plots.
+    Screen,
+    /// A keyboard.
+    Keyboard,
+    /// A whiteboard with drawings.
+    Whiteboard,
+    /// A view out of a window.
+    Outdoors,
+    /// Woven cloth, plain.
+    Cloth(Color),
+    /// Clothes with a pattern.
+    Shirt(Color, Color),
+    /// A face and the hair around it.
+    Head(Color, Color),
+    /// Hair.
+    Hair(Color),
+    /// Leaves of a plant.
+    Leaves,
+}
+
+impl Material {
+    /// Paints a surface of `size_m` metres with about `density` texels per metre.
+    pub fn paint(&self, size_m: [f32; 2], density: f32, seed: u64) -> Canvas {
+        let texels = |metres: f32| ((metres * density).round() as usize).clamp(4, 4096);
+        let mut canvas = Canvas::new(texels(size_m[0]), texels(size_m[1]));
+        let mut rng = Rng::new(seed, 0x7e);
+        // Metres per texel, after rounding.
+        let m = size_m[0] / canvas.width() as f32;
+        match *self {
+            Self::Floor(color) => floor(&mut canvas, color, m, seed),
+            Self::Plaster(color) => plaster(&mut canvas, color, m, seed, &mut rng),
+            Self::Wood(color) => wood(&mut canvas, color, m, seed),
+            Self::Plain(color) => plain(&mut canvas, color, m, seed, &mut rng),
+            Self::Ceiling => ceiling(&mut canvas, m, seed),
+            Self::Poster => print::poster(&mut canvas, &mut rng),
+            Self::Paper => print::paper(&mut canvas, m, &mut rng),
+            Self::Cover(color) => print::cover(&mut canvas, color, &mut rng),
+            Self::Spine(color) => print::spine(&mut canvas, color, &mut rng),
+            Self::Pages => pages(&mut canvas, seed),
+            Self::Cardboard => print::cardboard(&mut canvas, m, seed, &mut rng),
+            Self::Screen => print::screen(&mut canvas, &mut rng),
+            Self::Keyboard => print::keyboard(&mut canvas, &mut rng),
+            Self::Whiteboard => print::whiteboard(&mut canvas, m, &mut rng),
+            Self::Outdoors => print::outdoors(&mut canvas, seed, &mut rng),
+            Self::Cloth(color) => cloth(&mut canvas, color, m, seed),
+            Self::Shirt(base, accent) => shirt(&mut canvas, base, accent, m, seed, &mut rng),
+            Self::Head(skin, hair) => head(&mut canvas, skin, hair, seed),
+            Self::Hair(color) => hair_strands(&mut canvas, color, seed),
+            Self::Leaves => leaves(&mut canvas, m, seed),
+        }
+        canvas
+    }
+}
+
+/// `color` scaled by `factor`.
+pub fn tint(color: Color, factor: f32) -> Color {
+    color.map(|c| c * factor)
+}
+
+/// Blend from `a` to `b`.
+pub fn blend(a: Color, b: Color, t: f32) -> Color {
+    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)
+}
+
+fn floor(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
+    canvas.shade(|x, y, _| {
+        let (x, y) = (x * m, y * m);
+        let worn = fractal(seed, x * 1.3, y * 1.3, 4) - 0.5;
+        let marble = fractal(seed ^ 1, x * 9.0 + 2.0 * worn, y * 9.0, 4) - 0.5;
+        // Coloured chips of 8 to 16 mm, a fifth of the cells.
+        let chip = cell(seed ^ 2, x * 90.0 + marble * 3.0, y * 90.0 + worn * 3.0);
+        let chip = if chip > 0.93 {
+            0.22
+        } else if chip < 0.09 {
+            -0.22
+        } else {
+            0.0
+        };
+        tint(color, 1.0 + 0.20 * worn + 0.26 * marble + chip)
+    });
+}
+
+fn plaster(canvas: &mut Canvas, color: Color, m: f32, seed: u64, rng: &mut Rng) {
+    canvas.shade(|x, y, _| {
+        let (x, y) = (x * m, y * m);
+        let roller = fractal(seed, x * 2.0, y * 0.7, 3) - 0.5;
+        let grain = fractal(seed ^ 1, x * 35.0, y * 35.0, 3) - 0.5;
+        tint(color, 1.0 + 0.05 * roller + 0.05 * grain)
+    });
+    let area = canvas.width() as f32 * canvas.height() as f32 * m * m;
+    for _ in 0..(area * 3.0) as usize {
+        let at = [rng.range(0.0, canvas.width() as f32), rng.range(0.0, canvas.height() as f32)];
+        let dark = tint(color, rng.range(0.45, 0.85));
+        if rng.chance(0.5) {
+            canvas.disc(at[0], at[1], rng.range(0.004, 0.010) / m, dark);
+        } else {
+            let to = [at[0] + rng.range(-0.12, 0.12) / m, at[1] + rng.range(-0.03, 0.03) / m];
+            canvas.line(at, to, rng.range(0.002, 0.005) / m, dark);
+        }
+    }
+}
+
+fn wood(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
+    let along_x = canvas.width() >= canvas.height();
+    canvas.shade(|x, y, _| {
+        let (s, t) = if along_x { (x * m, y * m) } else { (y * m, x * m) };
+        let bend = fractal(seed, s * 1.1, t * 3.0, 3);
+        let rings = ((t * 38.0 + bend * 9.0) * std::f32::consts::TAU * 0.5).sin();
+        let fibre = fractal(seed ^ 1, s * 14.0, t * 260.0, 2) - 0.5;
+        let pore = if cell(seed ^ 2, s * 60.0, t * 500.0) > 0.97 { -0.25 } else { 0.0 };
+        tint(color, 0.95 + 0.07 * rings + 0.18 * fibre + 0.2 * (bend - 0.5) + pore)
+    });
+}
+
+fn plain(canvas: &mut Canvas, color: Color, m: f32, seed: u64, rng: &mut Rng) {
+    canvas.shade(|x, y, _| {
+        let cloud = fractal(seed, x * m * 6.0, y * m * 6.0, 3) - 0.5;
+        let grain = cell(seed ^ 1, x * m * 300.0, y * m * 300.0) - 0.5;
+        tint(color, 1.0 + 0.12 * cloud + 0.04 * grain)
+    });
+    let area = canvas.width() as f32 * canvas.height() as f32 * m * m;
+    for _ in 0..(area * 12.0) as usize {
+        let at = [rng.range(0.0, canvas.width() as f32), rng.range(0.0, canvas.height() as f32)];
+        let to = [at[0] + rng.range(-0.05, 0.05) / m, at[1] + rng.range(-0.05, 0.05) / m];
+        canvas.line(at, to, 0.0025 / m, tint(color, rng.range(0.6, 1.4)));
+    }
+}
+
+fn ceiling(canvas: &mut Canvas, m: f32, seed: u64) {
+    canvas.shade(|x, y, _| {
+        let (x, y) = (x * m, y * m);
+        let hole = cell(seed, x * 70.0, y * 70.0) > 0.90;
+        let stain = fractal(seed ^ 1, x * 1.5, y * 1.5, 3) - 0.5;
+        // Tiles of 0.6 m with a dark joint of 1 cm.
+        let joint = (x / 0.6).fract() * 0.6 < 0.01 || (y / 0.6).fract() * 0.6 < 0.01;
+        let level = if joint {
+            0.55
+        } else if hole {
+            0.72
+        } else {
+            0.90
+        };
+        tint([1.0, 0.99, 0.96], level + 0.08 * stain)
+    });
+}
+
+fn pages(canvas: &mut Canvas, seed: u64) {
+    canvas.shade(|x, y, _| {
+        let sheet = cell(seed, 0.0, y / 2.0) - 0.5;
+        tint([0.93, 0.90, 0.80], 0.92 + 0.14 * sheet + 0.05 * (cell(seed, x / 9.0, y) - 0.5))
+    });
+}
+
+fn cloth(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
+    canvas.shade(|x, y, _| {
+        let weave = cell(seed, x * m * 350.0, y * m * 350.0) - 0.5;
+        let fold = fractal(seed ^ 1, x * m * 7.0, y * m * 4.0, 4) - 0.5;
+        tint(color, 1.0 + 0.16 * weave + 0.45 * fold)
+    });
+}
+
+fn shirt(canvas: &mut Canvas, base: Color, accent: Color, m: f32, seed: u64, rng: &mut Rng) {
+    let (width, height) = (canvas.width() as f32, canvas.height() as f32);
+    match rng.below(4) {
+        0 => {
+            let stripe = rng.range(0.025, 0.05);
+            canvas.shade(|_, y, _| if (y * m / stripe).fract() < 0.4 { accent } else { base });
+        }
+        1 => {
+            let check = rng.range(0.05, 0.09);
+            canvas.shade(|x, y, _| {
+                let on = |t: f32| u8::from((t * m / check).fract() < 0.45);
+                blend(base, accent, 0.5 * f32::from(on(x) + on(y)))
+            });
+        }
+        2 => {
+            canvas.fill(base);
+            for _ in 0..60 {
+                let (x, y) = (rng.range(0.0, width), rng.range(0.0, height));
+                let (w, h) = (rng.range(0.02, 0.09) / m, rng.range(0.02, 0.09) / m);
+                canvas.rect(x, y, w, h, tint(accent, rng.range(0.6, 1.3)));
+            }
+        }
+        _ => {
+            canvas.fill(base);
+            // A print on chest (u = 1/4 is the front) and back.
+            for front in [0.25, 0.75] {
+                let size = (0.10 / m).min(width * 0.16);
+                canvas.rect(width * front - size, height * 0.30, 2.0 * size, 1.6 * size, accent);
+                print::word(canvas, width * front - 0.85 * size, height * 0.30 + 0.2 * size, 1.7 * size, base, rng);
+                canvas.disc(width * front, height * 0.30 + 1.15 * size, 0.3 * size, base);
+            }
+        }
+    }
+    canvas.shade(|x, y, old| {
+        let weave = cell(seed, x * m * 330.0, y * m * 330.0) - 0.5;
+        let fold = fractal(seed ^ 1, x * m * 8.0, y * m * 5.0, 4) - 0.5;
+        tint(old, 1.0 + 0.10 * weave + 0.40 * fold)
+    });
+}
+
+fn head(canvas: &mut Canvas, skin: Color, hair: Color, seed: u64) {
+    let (width, height) = (canvas.width() as f32, canvas.height() as f32);
+    canvas.shade(|x, y, _| {
+        // u = 1/4 looks forward; v = 0 is the crown.
+        let (u, v) = (x / width - 0.25, y / height);
+        let u = if u > 0.5 { u - 1.0 } else { u };
+        let fringe = 0.03 * (fractal(seed, x * 0.15, 0.0, 2) - 0.5);
+        let line = if u.abs() < 0.15 {
+            0.34
+        } else if u.abs() < 0.2 {
+            0.55
+        } else {
+            0.72
+        };
+        if v < line + fringe {
+            let strand = fractal(seed ^ 1, x * 0.5, y * 0.05, 2) - 0.5;
+            return tint(hair, 1.0 + 0.7 * strand);
+        }
+        let blotch = fractal(seed ^ 2, x * 0.08, y * 0.08, 3) - 0.5;
+        let near = |cu: f32, cv: f32, ru: f32, rv: f32| ((u - cu) / ru).powi(2) + ((v - cv) / rv).powi(2) < 1.0;
+        let side = u.abs();
+        let feature = if ((side - 0.055) / 0.022).abs() < 1.0 && (v - 0.425).abs() < 0.012 {
+            Some(tint(hair, 0.8)) // brow
+        } else if ((side - 0.055) / 0.009).powi(2) + ((v - 0.475) / 0.016).powi(2) < 1.0 {
+            Some([0.12, 0.10, 0.09]) // iris
+        } else if ((side - 0.055) / 0.022).powi(2) + ((v - 0.475) / 0.016).powi(2) < 1.0 {
+            Some([0.88, 0.86, 0.84]) // eye
+        } else if near(0.0, 0.60, 0.018, 0.014) {
+            Some(tint(skin, 0.72)) // nostrils
+        } else if near(0.0, 0.69, 0.045, 0.018) {
+            Some([0.66, 0.32, 0.30]) // mouth
+        } else {
+            None
+        };
+        tint(feature.unwrap_or(skin), 1.0 + 0.12 * blotch)
+    });
+}
+
+fn hair_strands(canvas: &mut Canvas, color: Color, seed: u64) {
+    canvas.shade(|x, y, _| tint(color, 1.0 + 0.8 * (fractal(seed, x * 0.6, y * 0.06, 3) - 0.5)));
+}
+
+fn leaves(canvas: &mut Canvas, m: f32, seed: u64) {
+    canvas.shade(|x, y, _| {
+        let leaf = cell(seed, x * m * 25.0 + fractal(seed ^ 3, x * m * 9.0, y * m * 9.0, 2) * 3.0, y * m * 18.0);
+        let shade = fractal(seed ^ 1, x * m * 30.0, y * m * 30.0, 3);
+        tint([0.30, 0.52, 0.22], 0.45 + 0.7 * leaf + 0.3 * (shade - 0.5))
+    });
+}

@@ -1,0 +1,231 @@
+//! The world: random access to rendered frames and their ground truth.
+//!
+//! In: a [`WorldConfig`]. Out: frames. A frame depends on the configuration and its number alone: any order, any number
+//! of threads and any machine of one kind give the same bits.
+
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
+use yfslam::image::Image;
+use yfslam::{BoundingBox, Camera, Detection, RgbdFrame};
+
+use crate::camera_path::CameraPath;
+use crate::config::{WorldConfig, WorldError};
+use crate::light::{LightMap, Occluder};
+use crate::people::People;
+use crate::render::rays::RayTable;
+use crate::render::shade::View;
+use crate::render::{self, Picture};
+use crate::rng::hash;
+use crate::scene::Scene;
+use crate::sensor;
+use crate::texture::Texture;
+
+/// A synthetic sequence, ready to render.
+#[derive(Debug)]
+pub struct World {
+    config: WorldConfig,
+    scene: Scene,
+    people: People,
+    path: CameraPath,
+    textures: Vec<Texture>,
+    light_maps: Vec<LightMap>,
+    rays: RayTable,
+    person_share: f64,
+}
+
+/// A rendered frame and all that is known about it.
+#[derive(Clone, Debug)]
+pub struct SynthFrame {
+    /// What a SLAM system sees. Detections are there if [`WorldConfig::detections`] asks for them.
+    pub frame: RgbdFrame,
+    /// Exact pose: world from camera.
+    pub t_world_cam: Isometry3<f64>,
+    /// 0 where the world stands still, k where person k (from 1) is seen.
+    pub instances: Image<u8>,
+    /// Depth along the optical axis in metres without any error; 0 where nothing is seen.
+    pub exact_depth: Image<f32>,
+    /// Exact boxes of the people who are visible enough, in the order of their numbers.
+    pub boxes: Vec<(u8, BoundingBox)>,
+}
+
+impl World {
+    /// Builds the scene, paints its textures, bakes its light and plans everyone's way.
+    ///
+    /// # Errors
+    /// If a value of the configuration is out of range.
+    pub fn new(config: &WorldConfig) -> Result<Self, WorldError> {
+        config.validate()?;
+        let mut scene = Scene::new(config.scene, config.seed);
+        let people = People::new(&mut scene, config.activity, config.people, config.seed);
+        let textures = scene.palette.paint();
+        let lights = scene.lights.clone();
+        let light_maps = lights.bake(&mut scene.mesh, config.light.shadow_rays, config.seed);
+        let path = CameraPath::new(config.motion, scene.camera, config.hand_shake, config.seed);
+        let rays = RayTable::new(&config.camera);
+        let config = config.clone();
+        let mut world = Self { config, scene, people, path, textures, light_maps, rays, person_share: 0.0 };
+        world.choose_distance();
+        Ok(world)
+    }
+
+    /// The configuration it was made of.
+    pub fn config(&self) -> &WorldConfig {
+        &self.config
+    }
+
+    /// Number of frames.
+    pub fn len(&self) -> usize {
+        self.config.frames
+    }
+
+    /// Whether there are no frames (never: a world has at least one).
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Mean share of the picture that people cover over the sequence, estimated on small pictures of some frames.
+    pub fn person_share(&self) -> f64 {
+        self.person_share
+    }
+
+    /// Time of frame `index`, ns.
+    pub fn timestamp_ns(&self, index: usize) -> i64 {
+        (self.seconds(index) * 1e9).round() as i64
+    }
+
+    /// Exact pose (world from camera) of frame `index`.
+    pub fn pose(&self, index: usize) -> Isometry3<f64> {
+        self.path.pose(self.seconds(index))
+    }
+
+    /// Renders frame `index`; numbers past the end go on with the same motion.
+    pub fn frame(&self, index: usize) -> SynthFrame {
+        let t_world_cam = self.pose(index);
+        let picture = self.render(&self.rays, self.seconds(index), &t_world_cam);
+        let (width, height) = (self.rays.width, self.rays.height);
+        let noise = hash(self.config.seed, 0x4015_e000 + index as u64);
+        let light = &self.config.light;
+        let sensor = &self.config.sensor;
+        let color =
+            sensor::color::develop(&picture.color, width, height, light.exposure, sensor.color_noise, hash(noise, 0));
+        let depth = sensor::depth::measure(&picture.depth, &self.config.camera, sensor, hash(noise, 1));
+        let boxes = self.boxes(&picture.instance);
+        let detections = self.config.detections.then(|| {
+            boxes.iter().map(|&(_, bbox)| Detection { class: 0, score: 1.0, bbox }).collect::<Vec<Detection>>()
+        });
+        SynthFrame {
+            frame: RgbdFrame {
+                timestamp_ns: self.timestamp_ns(index),
+                color: Arc::new(color),
+                depth: Arc::new(depth),
+                detections,
+            },
+            t_world_cam,
+            instances: image(width, height, picture.instance),
+            exact_depth: image(width, height, picture.depth),
+            boxes,
+        }
+    }
+
+    fn seconds(&self, index: usize) -> f64 {
+        index as f64 / self.config.camera.fps
+    }
+
+    fn render(&self, rays: &RayTable, time: f64, t_world_cam: &Isometry3<f64>) -> Picture {
+        let (people, occluders) = self.people.at(time, &self.scene.lights);
+        let t_cam_world = t_world_cam.inverse();
+        let nearby =
+            if self.config.light.moving_shadows { self.in_camera(&occluders, &t_cam_world) } else { Vec::new() };
+        let view = View {
+            meshes: [&self.scene.mesh, &people],
+            textures: &self.textures,
+            light_maps: &self.light_maps,
+            occluders: &nearby,
+            r_cam_world: t_cam_world.rotation.cast(),
+            pitch: rays.pitch,
+        };
+        render::render(rays, &t_cam_world, &view, self.config.antialias)
+    }
+
+    fn in_camera(&self, occluders: &[Occluder], t_cam_world: &Isometry3<f64>) -> Vec<Occluder> {
+        let pose: Isometry3<f32> = t_cam_world.cast();
+        let moved = |o: &Occluder| (pose * nalgebra::Point3::from(o.center)).coords;
+        occluders.iter().map(|o| Occluder { center: moved(o), ..*o }).collect()
+    }
+
+    /// Boxes around the visible pixels of everyone with enough of them.
+    fn boxes(&self, instances: &[u8]) -> Vec<(u8, BoundingBox)> {
+        let least = self.config.min_person_px as f64 * instances.len() as f64 / (640.0 * 480.0);
+        let mut found = vec![(0usize, [usize::MAX, usize::MAX, 0, 0]); self.config.people + 1];
+        for (i, &instance) in instances.iter().enumerate() {
+            if instance > 0 {
+                let (x, y) = (i % self.rays.width, i / self.rays.width);
+                let (count, [x0, y0, x1, y1]) = &mut found[usize::from(instance)];
+                *count += 1;
+                (*x0, *y0, *x1, *y1) = ((*x0).min(x), (*y0).min(y), (*x1).max(x + 1), (*y1).max(y + 1));
+            }
+        }
+        let visible = (0u8..).zip(&found).filter(|(_, (count, _))| *count > 0 && *count as f64 >= least);
+        visible
+            .map(|(instance, (_, [x0, y0, x1, y1]))| {
+                let bbox = BoundingBox { x_min: *x0 as f32, y_min: *y0 as f32, x_max: *x1 as f32, y_max: *y1 as f32 };
+                (instance, bbox)
+            })
+            .collect()
+    }
+
+    /// Bisects how near people walk, so that they cover the wanted share of the picture.
+    fn choose_distance(&mut self) {
+        if self.people.anyone_walks() {
+            let (mut near, mut far) = (1.0, 0.0);
+            for _ in 0..6 {
+                let middle = 0.5 * (near + far);
+                self.people.set_closeness(&self.scene, self.config.seed, middle);
+                if self.estimate_share() < self.config.person_share { far = middle } else { near = middle }
+            }
+            self.people.set_closeness(&self.scene, self.config.seed, 0.5 * (near + far));
+        }
+        self.person_share = self.estimate_share();
+    }
+
+    fn estimate_share(&self) -> f64 {
+        const FRAMES: usize = 24;
+        let scale = 16.0_f64.max(self.config.camera.width as f64 / 40.0);
+        let small = shrink(&self.config.camera, scale);
+        let rays = RayTable::new(&small);
+        let count = FRAMES.min(self.len());
+        let shares = (0..count).map(|k| {
+            let index = k * self.len() / count;
+            let (people, _) = self.people.at(self.seconds(index), &self.scene.lights);
+            let t_cam_world = self.pose(index).inverse();
+            let view = View {
+                meshes: [&self.scene.mesh, &people],
+                textures: &self.textures,
+                light_maps: &self.light_maps,
+                occluders: &[],
+                r_cam_world: t_cam_world.rotation.cast(),
+                pitch: rays.pitch,
+            };
+            render::actor_share(&rays, &t_cam_world, &view)
+        });
+        shares.sum::<f64>() / count as f64
+    }
+}
+
+/// The same view with fewer pixels.
+fn shrink(camera: &Camera, scale: f64) -> Camera {
+    Camera {
+        width: ((camera.width as f64 / scale) as usize).max(8),
+        height: ((camera.height as f64 / scale) as usize).max(8),
+        fx: camera.fx / scale,
+        fy: camera.fy / scale,
+        cx: (camera.cx + 0.5) / scale - 0.5,
+        cy: (camera.cy + 0.5) / scale - 0.5,
+        ..camera.clone()
+    }
+}
+
+fn image<T: Copy + Default>(width: usize, height: usize, data: Vec<T>) -> Image<T> {
+    Image::from_vec(width, height, data).unwrap_or_default()
+}

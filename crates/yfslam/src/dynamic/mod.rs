@@ -1,0 +1,130 @@
+//! Which features may be trusted to be static (YF-SLAM, section 3.3).
+//!
+//! In: boxes of movable objects, the depth image, the frame's features. Out: each feature's trust. Nothing else in the core knows that
+//! people exist.
+
+mod boxes;
+pub mod depth_group;
+mod tracks;
+mod yf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::DynamicConfig;
+use crate::detection::{BoundingBox, Detection};
+use crate::features::FrameFeatures;
+use crate::image::DepthImage;
+use tracks::Tracks;
+
+/// How moving things are kept out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Every feature is trusted, as in ORB-SLAM2.
+    None,
+    /// Every feature inside a box is dropped.
+    Boxes,
+    /// YF-SLAM: inside a box, the depth group of the body is dropped and the background stays.
+    #[default]
+    Yf,
+}
+
+/// A part of the image that was found to move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Region {
+    /// Where it is, px of the raw image.
+    pub bbox: BoundingBox,
+    /// Confidence of the detection it rests on.
+    pub score: f32,
+    /// Frames since that detection; 0 if it is of this frame.
+    pub misses: usize,
+    /// Depths of the moving body, m; `None` if the whole box moves.
+    pub depth_m: Option<[f32; 2]>,
+}
+
+/// Decides about the features of one frame after another.
+#[derive(Clone, Debug, Default)]
+pub struct DynamicFilter {
+    tracks: Tracks,
+    regions: Vec<Region>,
+    groups: yf::DepthGroups,
+}
+
+impl DynamicFilter {
+    /// A filter whose random draws start from `seed`.
+    pub fn new(seed: u64) -> Self {
+        Self { groups: yf::DepthGroups::new(seed), ..Self::default() }
+    }
+
+    /// Sets the trust of `features` from what boxes and depth tell, before the pose is known. `movable` are this frame's boxes of
+    /// movable objects at any score.
+    pub fn before_pose(
+        &mut self,
+        config: &DynamicConfig,
+        movable: &[Detection],
+        depth: &DepthImage,
+        features: &mut FrameFeatures,
+    ) {
+        self.regions.clear();
+        match config.method {
+            Method::None => return,
+            Method::Boxes => self.regions.extend(boxes::regions(config, movable)),
+            Method::Yf => {
+                self.tracks.update(config, movable, depth.raw.width(), depth.raw.height());
+                self.groups.regions(config, &mut self.tracks, depth, features, &mut self.regions);
+            }
+        }
+        apply(config, &mut self.regions, depth, features);
+    }
+
+    /// The parts of the last frame that were found to move.
+    pub fn regions(&self) -> &[Region] {
+        &self.regions
+    }
+
+    /// Forgets all tracks.
+    pub fn reset(&mut self) {
+        self.tracks = Tracks::default();
+        self.regions.clear();
+    }
+}
+
+/// Distrusts the features of all regions. If that leaves too few, the regions of least confidence are given up one by one: a false box
+/// must not take the ground from under tracking.
+fn apply(config: &DynamicConfig, regions: &mut Vec<Region>, depth: &DepthImage, features: &mut FrameFeatures) {
+    regions.sort_by(|a, b| b.score.total_cmp(&a.score));
+    loop {
+        let mut trusted = 0;
+        for f in &mut features.features {
+            let moving = regions.iter().any(|r| r.covers(config, depth, f.raw, f.octave));
+            f.trust = if moving { 0.0 } else { 1.0 };
+            trusted += usize::from(!moving);
+        }
+        if trusted >= config.min_trusted.min(features.len()) || regions.pop().is_none() {
+            return;
+        }
+    }
+}
+
+impl Region {
+    /// Whether a feature at a raw position belongs to the moving body: inside the box, at the body's depth or without depth, or with the
+    /// body within reach of its patch.
+    fn covers(&self, config: &DynamicConfig, depth: &DepthImage, raw: [f32; 2], octave: u8) -> bool {
+        let [x, y] = raw;
+        if !self.bbox.contains(x, y) {
+            return false;
+        }
+        let Some([near, far]) = self.depth_m else { return true };
+        let at = |dx: f32, dy: f32| depth.metres((x + dx + 0.5).max(0.0) as usize, (y + dy + 0.5).max(0.0) as usize);
+        let moves = |z: f32| z >= near && z <= far;
+        if at(0.0, 0.0).is_none_or(moves) {
+            return true;
+        }
+        // A corner on the outline belongs to neither side: its descriptor sees both.
+        let r = config.edge_px * 1.2f32.powi(i32::from(octave));
+        let h = r * std::f32::consts::FRAC_1_SQRT_2;
+        [(r, 0.0), (-r, 0.0), (0.0, r), (0.0, -r), (h, h), (h, -h), (-h, h), (-h, -h)]
+            .iter()
+            .any(|&(dx, dy)| at(dx, dy).is_some_and(moves))
+    }
+}

@@ -1,0 +1,131 @@
+//! Boxes over time: a detector that blinks must not let a person in.
+//!
+//! In: the boxes of a frame. Out: tracks, opened at a high score, kept at a low one, and carried over misses with the box's own velocity
+//! (Dynamic-VINS, section on missed detections).
+
+use crate::config::DynamicConfig;
+use crate::detection::{BoundingBox, Detection};
+
+/// A movable object followed in the image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Track {
+    /// Where it is, or should be, px.
+    pub bbox: BoundingBox,
+    /// Score of its last detection.
+    pub score: f32,
+    /// Frames since its last detection.
+    pub misses: usize,
+    /// Depth of the body when last seen, m.
+    pub depth_m: Option<f32>,
+    /// Motion of the box's centre, px per frame.
+    velocity: [f32; 2],
+}
+
+/// All tracks, in the order in which they were opened.
+#[derive(Clone, Debug, Default)]
+pub struct Tracks {
+    /// The tracks.
+    pub list: Vec<Track>,
+}
+
+impl Tracks {
+    /// Takes the boxes of the next frame in; `width` and `height` are those of the image, px.
+    pub fn update(&mut self, config: &DynamicConfig, detections: &[Detection], width: usize, height: usize) {
+        for track in &mut self.list {
+            track.misses += 1;
+            track.bbox = shifted(&track.bbox, track.velocity);
+        }
+        // Pairs of track and detection by descending overlap; indices break ties.
+        let mut pairs: Vec<(f32, usize, usize)> = Vec::new();
+        for (t, track) in self.list.iter().enumerate() {
+            for (d, detection) in detections.iter().enumerate() {
+                let iou = track.bbox.iou(&detection.bbox);
+                if iou >= config.track_min_iou && detection.score >= config.keep_score {
+                    pairs.push((iou, t, d));
+                }
+            }
+        }
+        pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        let (mut track_taken, mut taken) = (vec![false; self.list.len()], vec![false; detections.len()]);
+        for (_, t, d) in pairs {
+            if !track_taken[t] && !taken[d] {
+                track_taken[t] = true;
+                taken[d] = true;
+                self.list[t].follow(&detections[d]);
+            }
+        }
+        for (detection, taken) in detections.iter().zip(taken) {
+            if !taken && detection.score >= config.open_score {
+                self.list.push(Track {
+                    bbox: detection.bbox,
+                    score: detection.score,
+                    misses: 0,
+                    depth_m: None,
+                    velocity: [0.0; 2],
+                });
+            }
+        }
+        let image = BoundingBox { x_min: 0.0, y_min: 0.0, x_max: width as f32, y_max: height as f32 };
+        self.list.retain(|t| t.misses <= config.max_misses && t.bbox.iou(&image) > 0.0);
+    }
+}
+
+impl Track {
+    fn follow(&mut self, detection: &Detection) {
+        let (from, to) = (center(&self.bbox), center(&detection.bbox));
+        // The box was already moved by the old velocity: what is left is the error of the prediction. Half of it is believed.
+        for axis in 0..2 {
+            self.velocity[axis] += 0.5 * (to[axis] - from[axis]) / self.misses.max(1) as f32;
+        }
+        self.bbox = detection.bbox;
+        self.score = detection.score;
+        self.misses = 0;
+    }
+}
+
+fn center(b: &BoundingBox) -> [f32; 2] {
+    [0.5 * (b.x_min + b.x_max), 0.5 * (b.y_min + b.y_max)]
+}
+
+fn shifted(b: &BoundingBox, [dx, dy]: [f32; 2]) -> BoundingBox {
+    BoundingBox { x_min: b.x_min + dx, y_min: b.y_min + dy, x_max: b.x_max + dx, y_max: b.y_max + dy }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn detection(x: f32, score: f32) -> Detection {
+        let bbox = BoundingBox { x_min: x, y_min: 100.0, x_max: x + 100.0, y_max: 400.0 };
+        Detection { class: 0, score, bbox }
+    }
+
+    #[test]
+    fn a_walker_is_carried_over_missed_detections() {
+        let config = DynamicConfig::default();
+        let mut tracks = Tracks::default();
+        for i in 0..10 {
+            tracks.update(&config, &[detection(50.0 + 8.0 * i as f32, 0.8)], 640, 480);
+        }
+        for _ in 0..5 {
+            tracks.update(&config, &[], 640, 480);
+        }
+        assert_eq!((tracks.list.len(), tracks.list[0].misses), (1, 5));
+        assert!((tracks.list[0].bbox.x_min - 162.0).abs() < 4.0, "{:?}", tracks.list[0]);
+        for _ in 0..config.max_misses {
+            tracks.update(&config, &[], 640, 480);
+        }
+        assert!(tracks.list.is_empty());
+    }
+
+    #[test]
+    fn a_faint_box_keeps_a_track_but_opens_none() {
+        let config = DynamicConfig::default();
+        let mut tracks = Tracks::default();
+        tracks.update(&config, &[detection(50.0, 0.15)], 640, 480);
+        assert!(tracks.list.is_empty());
+        tracks.update(&config, &[detection(50.0, 0.5)], 640, 480);
+        tracks.update(&config, &[detection(52.0, 0.15)], 640, 480);
+        assert_eq!((tracks.list.len(), tracks.list[0].misses), (1, 0));
+    }
+}

@@ -1,0 +1,142 @@
+//! Method `yf`: Geometric Depth RANSAC inside boxes (YF-SLAM section 3.3), guarded where it is known to fail.
+//!
+//! In: tracks of boxes, the depth image, the frame's features. Out: for each track, the depths that move.
+
+use rand_pcg::Pcg32;
+
+use crate::config::DynamicConfig;
+use crate::detection::BoundingBox;
+use crate::dynamic::Region;
+use crate::dynamic::depth_group::{DepthGroup, Grouping, largest_exact, largest_ransac};
+use crate::dynamic::tracks::{Track, Tracks};
+use crate::features::FrameFeatures;
+use crate::image::DepthImage;
+
+/// Step between the pixels that stand for the depth of a box, px.
+const SAMPLE_STEP: usize = 4;
+
+/// Finds the depth group of the body in each box. Buffers are reused.
+#[derive(Clone, Debug)]
+pub struct DepthGroups {
+    rng: Pcg32,
+    feature_depths: Vec<f32>,
+    pixel_depths: Vec<f32>,
+}
+
+impl Default for DepthGroups {
+    fn default() -> Self {
+        Self::new(0)
+    }
+}
+
+impl DepthGroups {
+    /// Draws start from `seed`.
+    pub fn new(seed: u64) -> Self {
+        Self { rng: Pcg32::new(seed, 0x5eed), feature_depths: Vec::new(), pixel_depths: Vec::new() }
+    }
+
+    /// Appends the moving region of each track to `out` and notes the body's depth in the track. A track that was missed and shows no
+    /// body at its depth any more is dropped.
+    pub fn regions(
+        &mut self,
+        config: &DynamicConfig,
+        tracks: &mut Tracks,
+        depth: &DepthImage,
+        features: &FrameFeatures,
+        out: &mut Vec<Region>,
+    ) {
+        tracks.list.retain_mut(|track| {
+            self.collect(&track.bbox, depth, features);
+            let group = match self.body(config, track) {
+                Some(group) => group,
+                // No valid depth: whatever is in a box that was just detected moves; an old box is given up.
+                None if track.misses == 0 => {
+                    out.push(Region { bbox: track.bbox, score: track.score, misses: 0, depth_m: None });
+                    return true;
+                }
+                None => return false,
+            };
+            let inside = members(&self.pixel_depths, &group);
+            let center = inside.get(inside.len() / 2).copied().unwrap_or(0.5 * (group.near_m + group.far_m));
+            track.depth_m = Some(center);
+            out.push(Region {
+                bbox: grown(&track.bbox, config.margin),
+                score: track.score,
+                misses: track.misses,
+                depth_m: Some([
+                    center - config.group_half_width_m - config.reach_m,
+                    center + config.group_half_width_m,
+                ]),
+            });
+            true
+        });
+    }
+
+    /// Sorted depths of the features and of a grid of pixels inside a box.
+    fn collect(&mut self, bbox: &BoundingBox, depth: &DepthImage, features: &FrameFeatures) {
+        self.feature_depths.clear();
+        self.feature_depths
+            .extend(features.features.iter().filter(|f| bbox.contains(f.raw[0], f.raw[1])).filter_map(|f| f.depth_m));
+        self.feature_depths.sort_unstable_by(f32::total_cmp);
+        self.pixel_depths.clear();
+        let (x0, y0) = (bbox.x_min.max(0.0) as usize, bbox.y_min.max(0.0) as usize);
+        let (x1, y1) = (bbox.x_max.max(0.0) as usize, bbox.y_max.max(0.0) as usize);
+        for y in (y0..y1.min(depth.raw.height())).step_by(SAMPLE_STEP) {
+            let row = (x0..x1.min(depth.raw.width())).step_by(SAMPLE_STEP);
+            self.pixel_depths.extend(row.filter_map(|x| depth.metres(x, y)));
+        }
+        self.pixel_depths.sort_unstable_by(f32::total_cmp);
+    }
+
+    /// The depth group of the body.
+    ///
+    /// The largest group of feature depths, as the paper has it, unless enough of the box's pixels lie in front of it: a box that is
+    /// mostly wall has its largest group behind the person. Then only what is in front is asked. A track that knows its depth is
+    /// looked for there first.
+    fn body(&mut self, config: &DynamicConfig, track: &Track) -> Option<DepthGroup> {
+        let width = 2.0 * config.group_half_width_m;
+        if let Some(z) = track.depth_m {
+            let step = config.max_depth_step_m * (1 + track.misses) as f32;
+            let near =
+                within(&self.pixel_depths, z - config.group_half_width_m - step, z + config.group_half_width_m + step);
+            let group = largest_exact(near, width);
+            if let Some(g) = group
+                && g.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32
+            {
+                return group;
+            }
+            if track.misses > 0 {
+                return None;
+            }
+        }
+        let mut group = match config.grouping {
+            Grouping::Ransac => largest_ransac(&self.feature_depths, width, &mut self.rng),
+            Grouping::Exact => largest_exact(&self.feature_depths, width),
+        }
+        .or_else(|| largest_exact(&self.pixel_depths, width))?;
+        loop {
+            let in_front = within(&self.pixel_depths, 0.0, group.near_m - config.group_gap_m);
+            match largest_exact(in_front, width) {
+                Some(g) if g.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32 => group = g,
+                _ => return Some(group),
+            }
+        }
+    }
+}
+
+/// The part of `sorted` in [from, to].
+fn within(sorted: &[f32], from: f32, to: f32) -> &[f32] {
+    let start = sorted.partition_point(|z| *z < from);
+    let end = sorted.partition_point(|z| *z <= to).max(start);
+    &sorted[start..end]
+}
+
+fn members<'a>(sorted: &'a [f32], group: &DepthGroup) -> &'a [f32] {
+    within(sorted, group.near_m, group.far_m)
+}
+
+/// The box with its sides moved out by `share` of its size.
+fn grown(b: &BoundingBox, share: f32) -> BoundingBox {
+    let (dx, dy) = (share * (b.x_max - b.x_min), share * (b.y_max - b.y_min));
+    BoundingBox { x_min: b.x_min - dx, y_min: b.y_min - dy, x_max: b.x_max + dx, y_max: b.y_max + dy }
+}

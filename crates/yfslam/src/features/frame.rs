@@ -1,0 +1,233 @@
+//! The features of one RGB-D frame: undistorted, with depth and trust, and a grid to find them by position.
+//!
+//! In: key points and descriptors of the grey image, the depth image, the camera. Out: [`FrameFeatures`].
+
+use crate::camera::Camera;
+use crate::features::{Descriptor, Features};
+use crate::image::DepthImage;
+
+/// Columns of the search grid. Source: ORB-SLAM2.
+const GRID_COLUMNS: usize = 64;
+/// Rows of the search grid. Source: ORB-SLAM2.
+const GRID_ROWS: usize = 48;
+
+/// One feature of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Feature {
+    /// Position in the image as the camera saw it, px.
+    pub raw: [f32; 2],
+    /// Undistorted column, px.
+    pub u: f32,
+    /// Undistorted row, px.
+    pub v: f32,
+    /// Pyramid level.
+    pub octave: u8,
+    /// Orientation, radians.
+    pub angle_rad: f32,
+    /// Depth along the optical axis, m, if the sensor measured one.
+    pub depth_m: Option<f32>,
+    /// How far the feature may be trusted to be static, in [0, 1]; 0 keeps it out of pose and map.
+    pub trust: f32,
+}
+
+/// All features of a frame, with their descriptors at the same index.
+#[derive(Clone, Debug, Default)]
+pub struct FrameFeatures {
+    /// The features.
+    pub features: Vec<Feature>,
+    /// Their descriptors.
+    pub descriptors: Vec<Descriptor>,
+    bounds: ImageBounds,
+    /// Feature indices ordered by cell; the cell `c` holds `order[start[c]..start[c + 1]]`.
+    order: Vec<u32>,
+    start: Vec<u32>,
+}
+
+/// Extent of the undistorted image, px.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImageBounds {
+    /// Left.
+    pub u_min: f32,
+    /// Right.
+    pub u_max: f32,
+    /// Top.
+    pub v_min: f32,
+    /// Bottom.
+    pub v_max: f32,
+}
+
+impl ImageBounds {
+    /// The undistorted extent of the camera's image: the box around its undistorted border.
+    pub fn of(camera: &Camera) -> Self {
+        let (w, h) = (camera.width as f64, camera.height as f64);
+        let border = (0..=16).flat_map(|i| {
+            let t = f64::from(i) / 16.0;
+            [[t * w, 0.0], [t * w, h], [0.0, t * h], [w, t * h]]
+        });
+        let mut bounds = Self { u_min: f32::MAX, u_max: f32::MIN, v_min: f32::MAX, v_max: f32::MIN };
+        for [x, y] in border {
+            let [u, v] = camera.undistort_px(x, y);
+            bounds.u_min = bounds.u_min.min(u as f32);
+            bounds.u_max = bounds.u_max.max(u as f32);
+            bounds.v_min = bounds.v_min.min(v as f32);
+            bounds.v_max = bounds.v_max.max(v as f32);
+        }
+        bounds
+    }
+
+    /// Whether an undistorted position lies inside.
+    pub fn contains(&self, u: f32, v: f32) -> bool {
+        u >= self.u_min && u < self.u_max && v >= self.v_min && v < self.v_max
+    }
+}
+
+impl FrameFeatures {
+    /// Refills `self` from one frame's key points; all features start trusted. Buffers are reused.
+    pub fn fill(&mut self, extracted: &Features, depth: &DepthImage, camera: &Camera, bounds: ImageBounds) {
+        self.bounds = bounds;
+        self.descriptors.clone_from(&extracted.descriptors);
+        self.features.clear();
+        self.features.extend(extracted.key_points.iter().map(|k| {
+            let [u, v] = camera.undistort_px(f64::from(k.x), f64::from(k.y));
+            Feature {
+                raw: [k.x, k.y],
+                u: u as f32,
+                v: v as f32,
+                octave: k.octave,
+                angle_rad: k.angle_rad,
+                depth_m: depth.metres((k.x + 0.5) as usize, (k.y + 0.5) as usize),
+                trust: 1.0,
+            }
+        }));
+        self.index();
+    }
+
+    /// Number of features.
+    pub fn len(&self) -> usize {
+        self.features.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.features.is_empty()
+    }
+
+    /// Extent of the undistorted image.
+    pub fn bounds(&self) -> ImageBounds {
+        self.bounds
+    }
+
+    /// Calls `visit` with the index of each feature within `radius` (px, maximum norm) of (u, v) whose octave lies in
+    /// `octaves`.
+    #[inline]
+    pub fn for_each_near(
+        &self,
+        u: f32,
+        v: f32,
+        radius: f32,
+        octaves: std::ops::RangeInclusive<u8>,
+        mut visit: impl FnMut(usize),
+    ) {
+        let b = &self.bounds;
+        if self.start.is_empty()
+            || !(u + radius >= b.u_min && u - radius < b.u_max && v + radius >= b.v_min && v - radius < b.v_max)
+        {
+            return;
+        }
+        let (c0, r0) = self.cell(u - radius, v - radius);
+        let (c1, r1) = self.cell(u + radius, v + radius);
+        for row in r0..=r1 {
+            // Cells of a row lie side by side: one run of indices.
+            let from = self.start[row * GRID_COLUMNS + c0] as usize;
+            let to = self.start[row * GRID_COLUMNS + c1 + 1] as usize;
+            for &i in &self.order[from..to] {
+                let f = &self.features[i as usize];
+                if octaves.contains(&f.octave) && (f.u - u).abs() <= radius && (f.v - v).abs() <= radius {
+                    visit(i as usize);
+                }
+            }
+        }
+    }
+
+    /// Column and row of the grid cell of a position, clamped to the grid.
+    fn cell(&self, u: f32, v: f32) -> (usize, usize) {
+        let b = &self.bounds;
+        let column = (u - b.u_min) / (b.u_max - b.u_min) * GRID_COLUMNS as f32;
+        let row = (v - b.v_min) / (b.v_max - b.v_min) * GRID_ROWS as f32;
+        // A float cast saturates: negative and NaN become 0.
+        ((column as usize).min(GRID_COLUMNS - 1), (row as usize).min(GRID_ROWS - 1))
+    }
+
+    /// Counting sort of the features into cells.
+    fn index(&mut self) {
+        self.start.clear();
+        self.start.resize(GRID_COLUMNS * GRID_ROWS + 1, 0);
+        self.order.clear();
+        self.order.resize(self.features.len(), 0);
+        for i in 0..self.features.len() {
+            let (c, r) = self.cell(self.features[i].u, self.features[i].v);
+            self.start[r * GRID_COLUMNS + c + 1] += 1;
+        }
+        for c in 1..self.start.len() {
+            self.start[c] += self.start[c - 1];
+        }
+        for i in (0..self.features.len()).rev() {
+            let (c, r) = self.cell(self.features[i].u, self.features[i].v);
+            let cell = r * GRID_COLUMNS + c;
+            // Filling each cell from its end: `start[cell + 1]` runs down to the cell's beginning, which is restored below.
+            self.start[cell + 1] -= 1;
+            self.order[self.start[cell + 1] as usize] = i as u32;
+        }
+        // Each entry now holds the beginning of the cell before it: shift by one.
+        self.start.remove(0);
+        self.start.push(self.features.len() as u32);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::features::KeyPoint;
+    use crate::image::Image;
+    use proptest::prelude::*;
+
+    fn camera() -> Camera {
+        Camera {
+            width: 640,
+            height: 480,
+            fx: 517.3,
+            fy: 516.5,
+            cx: 318.6,
+            cy: 255.3,
+            distortion: [0.262383, -0.953104, -0.005358, 0.002628, 1.163314],
+            depth_factor: 5000.0,
+            fps: 30.0,
+            bf: 40.0,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn grid_search_finds_what_a_full_scan_finds(
+            points in prop::collection::vec((0f32..640.0, 0f32..480.0, 0u8..8), 0..200),
+            u in -50f32..700.0, v in -50f32..550.0, radius in 0f32..120.0, low in 0u8..8,
+        ) {
+            let camera = camera();
+            let extracted = Features {
+                key_points: points.iter().map(|&(x, y, octave)| KeyPoint { x, y, octave, ..Default::default() }).collect(),
+                descriptors: vec![Descriptor::default(); points.len()],
+            };
+            let depth = DepthImage { raw: Image::new(640, 480), metres_per_unit: 0.001 };
+            let mut frame = FrameFeatures::default();
+            frame.fill(&extracted, &depth, &camera, ImageBounds::of(&camera));
+            let mut found = Vec::new();
+            frame.for_each_near(u, v, radius, low..=low + 1, |i| found.push(i));
+            found.sort_unstable();
+            let expected: Vec<usize> = (0..frame.len()).filter(|&i| {
+                let f = &frame.features[i];
+                (low..=low + 1).contains(&f.octave) && (f.u - u).abs() <= radius && (f.v - v).abs() <= radius
+            }).collect();
+            prop_assert_eq!(found, expected);
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! Rigid motions and the pinhole model in the form the optimisers need.
+
+mod pinhole;
+mod se3;
+
+pub use pinhole::Pinhole;
+pub use se3::{perturbed, se3_exp, se3_log, skew};
+
+/// A rigid motion; `t_a_b` maps points given in frame b into frame a.
+pub type Pose = nalgebra::Isometry3<f64>;

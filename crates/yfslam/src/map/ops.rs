@@ -1,0 +1,270 @@
+//! Every change of the map. Each operation leaves the invariants of [`crate::map`] standing and ignores ids that are gone.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::features::FrameFeatures;
+use crate::geometry::Pose;
+use crate::map::{KeyFrame, KeyFrameId, Landmark, LandmarkId, Map};
+
+/// Shared landmarks that make two keyframes covisible. Source: ORB-SLAM2.
+pub const COVISIBLE_MIN_SHARED: usize = 15;
+
+impl Map {
+    /// Adds a keyframe without observations and outside the spanning tree; [`Map::update_covisibility`] connects it.
+    pub fn insert_keyframe(&mut self, timestamp_ns: i64, t_cam_world: Pose, features: FrameFeatures) -> KeyFrameId {
+        let sequence = self.keyframes_ever;
+        self.keyframes_ever += 1;
+        let landmarks = vec![None; features.len()];
+        self.keyframes.insert(KeyFrame {
+            timestamp_ns,
+            sequence,
+            t_cam_world,
+            features,
+            landmarks,
+            covisible: Vec::new(),
+            parent: None,
+            children: Vec::new(),
+        })
+    }
+
+    /// Adds a landmark at `position` (world, m) seen by feature `feature` of `keyframe`; replaces what the feature saw before.
+    pub fn insert_landmark(
+        &mut self,
+        position: Point3<f64>,
+        keyframe: KeyFrameId,
+        feature: usize,
+        color: [u8; 3],
+        scale_factors: &[f32],
+    ) -> Option<LandmarkId> {
+        let source = self.keyframes.get(keyframe)?;
+        let descriptor = *source.features.descriptors.get(feature)?;
+        let born = source.sequence;
+        let id = self.landmarks.insert(Landmark {
+            position,
+            descriptor,
+            normal: Vector3::zeros(),
+            max_distance_m: 0.0,
+            min_distance_m: 0.0,
+            observations: Vec::with_capacity(4),
+            reference: keyframe,
+            born,
+            visible: 1,
+            found: 1,
+            color,
+        });
+        self.add_observation(id, keyframe, feature);
+        self.update_landmark(id, scale_factors);
+        Some(id)
+    }
+
+    /// Notes that `feature` of `keyframe` sees `landmark`; replaces what the feature saw before. Does nothing if the keyframe sees
+    /// the landmark with another feature already.
+    pub fn add_observation(&mut self, landmark: LandmarkId, keyframe: KeyFrameId, feature: usize) {
+        let Some(slot) = self.keyframes.get(keyframe).and_then(|k| k.landmarks.get(feature)) else { return };
+        let previous = *slot;
+        if previous == Some(landmark) || self.landmarks.get(landmark).is_none_or(|l| l.feature_in(keyframe).is_some()) {
+            return;
+        }
+        if let Some(previous) = previous {
+            self.remove_observation(previous, keyframe);
+        }
+        self.landmarks[landmark].observations.push((keyframe, feature as u32));
+        self.keyframes[keyframe].landmarks[feature] = Some(landmark);
+    }
+
+    /// Takes the observation of `landmark` by `keyframe` away; a landmark without observations is removed.
+    pub fn remove_observation(&mut self, landmark: LandmarkId, keyframe: KeyFrameId) {
+        let Some(l) = self.landmarks.get_mut(landmark) else { return };
+        let Some(at) = l.observations.iter().position(|(k, _)| *k == keyframe) else { return };
+        let (_, feature) = l.observations.remove(at);
+        self.keyframes[keyframe].landmarks[feature as usize] = None;
+        match l.observations.first() {
+            None => {
+                self.landmarks.remove(landmark);
+            }
+            Some(&(oldest, _)) if l.reference == keyframe => l.reference = oldest,
+            Some(_) => {}
+        }
+    }
+
+    /// Removes a landmark from the map and from all keyframes.
+    pub fn remove_landmark(&mut self, landmark: LandmarkId) {
+        if let Some(l) = self.landmarks.remove(landmark) {
+            for (keyframe, feature) in l.observations {
+                self.keyframes[keyframe].landmarks[feature as usize] = None;
+            }
+        }
+    }
+
+    /// Hands the observations of `gone` over to `kept` and removes `gone`. Where a keyframe sees both, `kept` keeps its feature.
+    pub fn merge_landmarks(&mut self, kept: LandmarkId, gone: LandmarkId) {
+        if kept == gone || !self.landmarks.contains_key(kept) {
+            return;
+        }
+        let Some(l) = self.landmarks.get(gone) else { return };
+        let (observations, visible, found) = (l.observations.clone(), l.visible, l.found);
+        self.remove_landmark(gone);
+        for (keyframe, feature) in observations {
+            self.add_observation(kept, keyframe, feature as usize);
+        }
+        let l = &mut self.landmarks[kept];
+        l.visible += visible;
+        l.found += found;
+    }
+
+    /// Recomputes descriptor, normal and distance range of a landmark from its observations.
+    pub fn update_landmark(&mut self, landmark: LandmarkId, scale_factors: &[f32]) {
+        let Some(l) = self.landmarks.get(landmark) else { return };
+        let mut normal = Vector3::zeros();
+        let mut descriptors = Vec::with_capacity(l.observations.len());
+        for &(k, f) in &l.observations {
+            let keyframe = &self.keyframes[k];
+            let center = keyframe.t_cam_world.inverse_transform_point(&Point3::origin());
+            normal += (l.position - center).normalize();
+            descriptors.push(keyframe.features.descriptors[f as usize]);
+        }
+        // The reference may have been culled; remove_observation then names another.
+        let (Some(reference), Some(feature)) = (self.keyframes.get(l.reference), l.feature_in(l.reference)) else {
+            return;
+        };
+        let octave = usize::from(reference.features.features[feature].octave);
+        let center = reference.t_cam_world.inverse_transform_point(&Point3::origin());
+        let distance = (l.position - center).norm();
+        let best = descriptors
+            .iter()
+            .map(|d| {
+                let mut distances: Vec<u32> = descriptors.iter().map(|e| d.distance(e)).collect();
+                let middle = (distances.len() - 1) / 2;
+                *distances.select_nth_unstable(middle).1
+            })
+            .enumerate()
+            .min_by_key(|&(i, median)| (median, i))
+            .map(|(i, _)| descriptors[i]);
+        let scale = |level: usize| f64::from(scale_factors.get(level).copied().unwrap_or(1.0));
+        let l = &mut self.landmarks[landmark];
+        l.normal = normal.try_normalize(1e-12).unwrap_or_else(Vector3::zeros);
+        l.max_distance_m = distance * scale(octave);
+        l.min_distance_m = l.max_distance_m / scale(scale_factors.len().saturating_sub(1));
+        if let Some(best) = best {
+            l.descriptor = best;
+        }
+    }
+
+    /// Moves a landmark, m.
+    pub fn set_position(&mut self, landmark: LandmarkId, position: Point3<f64>) {
+        if let Some(l) = self.landmarks.get_mut(landmark) {
+            l.position = position;
+        }
+    }
+
+    /// Moves a keyframe.
+    pub fn set_pose(&mut self, keyframe: KeyFrameId, t_cam_world: Pose) {
+        if let Some(k) = self.keyframes.get_mut(keyframe) {
+            k.t_cam_world = t_cam_world;
+        }
+    }
+
+    /// Counts a frame that should have seen the landmark.
+    pub fn count_visible(&mut self, landmark: LandmarkId) {
+        if let Some(l) = self.landmarks.get_mut(landmark) {
+            l.visible += 1;
+        }
+    }
+
+    /// Counts a frame that found the landmark.
+    pub fn count_found(&mut self, landmark: LandmarkId) {
+        if let Some(l) = self.landmarks.get_mut(landmark) {
+            l.found += 1;
+        }
+    }
+
+    /// Recounts which keyframes share landmarks with `keyframe` and updates both sides; a keyframe not yet in the spanning tree
+    /// becomes a child of the one it shares most with.
+    pub fn update_covisibility(&mut self, keyframe: KeyFrameId) {
+        let Some(k) = self.keyframes.get(keyframe) else { return };
+        let mut seen: Vec<KeyFrameId> = k
+            .sights()
+            .filter_map(|(_, l)| self.landmarks.get(l))
+            .flat_map(|l| l.observations.iter().map(|(other, _)| *other))
+            .filter(|other| *other != keyframe)
+            .collect();
+        seen.sort_unstable();
+        let mut counts: Vec<(KeyFrameId, usize)> =
+            seen.chunk_by(|a, b| a == b).map(|run| (run[0], run.len())).collect();
+        counts.sort_by_key(|&(id, count)| (std::cmp::Reverse(count), id));
+        // The best one always counts, so that the graph stays connected.
+        let keep = counts.partition_point(|&(_, count)| count >= COVISIBLE_MIN_SHARED).max(1).min(counts.len());
+        counts.truncate(keep);
+        let before = std::mem::take(&mut self.keyframes[keyframe].covisible);
+        for (other, _) in before {
+            if let Some(o) = self.keyframes.get_mut(other) {
+                o.covisible.retain(|(id, _)| *id != keyframe);
+            }
+        }
+        for &(other, count) in &counts {
+            let list = &mut self.keyframes[other].covisible;
+            let at = list.partition_point(|&(id, c)| (std::cmp::Reverse(c), id) < (std::cmp::Reverse(count), keyframe));
+            list.insert(at, (keyframe, count));
+        }
+        let parent = counts.first().map(|(id, _)| *id);
+        let k = &mut self.keyframes[keyframe];
+        k.covisible = counts;
+        if let (None, Some(parent), true) = (k.parent, parent, k.sequence > 0) {
+            k.parent = Some(parent);
+            self.keyframes[parent].children.push(keyframe);
+        }
+    }
+
+    /// Removes a keyframe with its observations; its children go to its parent. The first keyframe and those outside the spanning
+    /// tree stay: returns whether it was removed.
+    pub fn remove_keyframe(&mut self, keyframe: KeyFrameId) -> bool {
+        let Some(parent) = self.keyframes.get(keyframe).and_then(|k| k.parent) else { return false };
+        let sights: Vec<LandmarkId> = self.keyframes[keyframe].sights().map(|(_, l)| l).collect();
+        for landmark in sights {
+            self.remove_observation(landmark, keyframe);
+        }
+        let Some(k) = self.keyframes.remove(keyframe) else { return false };
+        for (other, _) in &k.covisible {
+            self.keyframes[*other].covisible.retain(|(id, _)| *id != keyframe);
+        }
+        self.keyframes[parent].children.retain(|c| *c != keyframe);
+        for child in k.children {
+            self.keyframes[child].parent = Some(parent);
+            self.keyframes[parent].children.push(child);
+        }
+        self.removed.insert(keyframe, (parent, k.t_cam_world * self.keyframes[parent].t_cam_world.inverse()));
+        true
+    }
+
+    /// Checks the invariants; an error names the first that is broken. For tests and for maps read from files.
+    pub fn validate(&self) -> Result<(), String> {
+        for (id, l) in &self.landmarks {
+            if l.observations.is_empty() {
+                return Err(format!("landmark {id:?} has no observation"));
+            }
+            for &(k, f) in &l.observations {
+                let listed = self.keyframes.get(k).and_then(|k| k.landmarks.get(f as usize)).copied().flatten();
+                if listed != Some(id) {
+                    return Err(format!("landmark {id:?} names feature {f} of {k:?}, which lists {listed:?}"));
+                }
+            }
+        }
+        for (id, k) in &self.keyframes {
+            for (f, l) in k.sights() {
+                if self.landmarks.get(l).and_then(|l| l.feature_in(id)) != Some(f) {
+                    return Err(format!("feature {f} of {id:?} names {l:?}, which does not list it"));
+                }
+            }
+            for &(other, count) in &k.covisible {
+                let back = self.keyframes.get(other).and_then(|o| o.covisible.iter().find(|(i, _)| *i == id));
+                if back != Some(&(id, count)) {
+                    return Err(format!("covisibility of {id:?} and {other:?} is not mutual"));
+                }
+            }
+            if k.parent.is_some_and(|p| self.keyframes.get(p).is_none_or(|p| !p.children.contains(&id))) {
+                return Err(format!("the parent of {id:?} does not list it as a child"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,62 @@
+//! What the map can do without (ORB-SLAM, IEEE T-RO 2015, sections VI-B and VI-E).
+
+use crate::config::MappingConfig;
+use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::sensor::SensorModel;
+
+/// Removes young landmarks that are rarely found or seldom observed. Returns those still on probation after `keyframe`.
+pub fn young_landmarks(
+    config: &MappingConfig,
+    map: &mut Map,
+    keyframe: KeyFrameId,
+    young: Vec<LandmarkId>,
+) -> Vec<LandmarkId> {
+    let now = map.keyframe(keyframe).map_or(0, |k| k.sequence);
+    let mut still_young = Vec::with_capacity(young.len());
+    for id in young {
+        let Some(landmark) = map.landmark(id) else { continue };
+        let age = now.saturating_sub(landmark.born);
+        let rarely_found = f64::from(landmark.found) < config.min_found_ratio * f64::from(landmark.visible);
+        let seldom_seen = age >= 2 && map.observation_weight(landmark) < config.min_observation_weight;
+        if rarely_found || seldom_seen {
+            map.remove_landmark(id);
+        } else if age < config.probation_keyframes {
+            still_young.push(id);
+        }
+    }
+    still_young
+}
+
+/// Removes covisible keyframes of `keyframe` of whose close landmarks nearly all are seen as finely by enough others.
+pub fn redundant_keyframes(sensor: &SensorModel, config: &MappingConfig, map: &mut Map, keyframe: KeyFrameId) {
+    let Some(k) = map.keyframe(keyframe) else { return };
+    let candidates: Vec<KeyFrameId> = k.covisible.iter().map(|(id, _)| *id).collect();
+    for candidate in candidates {
+        if is_redundant(sensor, config, map, candidate) {
+            map.remove_keyframe(candidate);
+        }
+    }
+}
+
+fn is_redundant(sensor: &SensorModel, config: &MappingConfig, map: &Map, candidate: KeyFrameId) -> bool {
+    let Some(k) = map.keyframe(candidate) else { return false };
+    let (mut total, mut redundant) = (0usize, 0usize);
+    for (i, id) in k.sights() {
+        let Some(landmark) = map.landmark(id) else { continue };
+        let f = &k.features.features[i];
+        if f.depth_m.is_none_or(|z| f64::from(z) > sensor.close_limit_m) {
+            continue;
+        }
+        total += 1;
+        let views = landmark
+            .observations
+            .iter()
+            .filter(|(other, _)| *other != candidate)
+            .filter_map(|&(other, g)| map.keyframe(other).map(|o| o.features.features[g as usize].octave))
+            .filter(|octave| *octave <= f.octave + 1)
+            .take(config.redundant_views)
+            .count();
+        redundant += usize::from(views >= config.redundant_views);
+    }
+    total > 0 && redundant as f64 > config.redundant_share * total as f64
+}

@@ -1,0 +1,43 @@
+//! Landmarks straight from the depth image (ORB-SLAM2, IEEE T-RO 2017, section III-D).
+
+use crate::config::MappingConfig;
+use crate::image::RgbImage;
+use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::mapping::color_at;
+use crate::sensor::SensorModel;
+
+/// Makes landmarks of the trusted features of `keyframe` that see none: all within the close limit, and the nearest of the others
+/// until `min_depth_landmarks` features with depth were looked at.
+pub fn new_landmarks(
+    sensor: &SensorModel,
+    config: &MappingConfig,
+    map: &mut Map,
+    keyframe: KeyFrameId,
+    color: &RgbImage,
+) -> Vec<LandmarkId> {
+    let mut created = Vec::new();
+    let Some(k) = map.keyframe(keyframe) else { return created };
+    let t_world_cam = k.t_cam_world.inverse();
+    let mut by_depth: Vec<(f32, usize)> = k
+        .features
+        .features
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| f.trust > 0.0)
+        .filter_map(|(i, f)| Some((f.depth_m?, i)))
+        .collect();
+    by_depth.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    for (n, (z, i)) in by_depth.into_iter().enumerate() {
+        if f64::from(z) > sensor.close_limit_m && n >= config.min_depth_landmarks {
+            break;
+        }
+        let Some(k) = map.keyframe(keyframe) else { break };
+        if k.landmarks[i].is_some() {
+            continue;
+        }
+        let f = k.features.features[i];
+        let point = t_world_cam * sensor.pinhole.unproject(f64::from(f.u), f64::from(f.v), f64::from(z));
+        created.extend(map.insert_landmark(point, keyframe, i, color_at(color, f.raw), &sensor.scale_factors));
+    }
+    created
+}

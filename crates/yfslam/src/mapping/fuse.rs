@@ -1,0 +1,86 @@
+//! Duplicates: landmarks of one keyframe are sought in its neighbours, and joined with what is found there (ORB-SLAM, IEEE T-RO 2015,
+//! section VI-C).
+
+use crate::config::Config;
+use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::optimize::residual::{CHI2_PIXEL, CHI2_PIXEL_DEPTH};
+use crate::sensor::SensorModel;
+use crate::tracking::search::{Best, Projector};
+
+/// Joins duplicates between `keyframe` and its first and second neighbours, both ways.
+pub fn duplicates(sensor: &SensorModel, config: &Config, map: &mut Map, keyframe: KeyFrameId) {
+    let targets = neighbourhood(config, map, keyframe);
+    for &target in &targets {
+        let own = landmarks_of(map, keyframe);
+        fuse_into(sensor, config, map, target, &own);
+    }
+    let mut theirs: Vec<LandmarkId> = targets.iter().flat_map(|&t| landmarks_of(map, t)).collect();
+    theirs.sort_unstable();
+    theirs.dedup();
+    fuse_into(sensor, config, map, keyframe, &theirs);
+    for id in landmarks_of(map, keyframe) {
+        map.update_landmark(id, &sensor.scale_factors);
+    }
+}
+
+fn landmarks_of(map: &Map, keyframe: KeyFrameId) -> Vec<LandmarkId> {
+    map.keyframe(keyframe).map(|k| k.sights().map(|(_, id)| id).collect()).unwrap_or_default()
+}
+
+/// The best covisible keyframes and the best of each of those.
+fn neighbourhood(config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<KeyFrameId> {
+    let best = |id: KeyFrameId, n: usize| {
+        map.keyframe(id).into_iter().flat_map(move |k| k.covisible.iter().take(n).map(|(id, _)| *id))
+    };
+    let mut targets: Vec<KeyFrameId> = Vec::new();
+    for first in best(keyframe, config.mapping.fuse_neighbours) {
+        for id in std::iter::once(first).chain(best(first, config.mapping.fuse_second_neighbours)) {
+            if id != keyframe && !targets.contains(&id) {
+                targets.push(id);
+            }
+        }
+    }
+    targets
+}
+
+/// Projects landmarks into `target`: a feature that fits gets the landmark, or its own is merged with it.
+fn fuse_into(sensor: &SensorModel, config: &Config, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
+    let Some(k) = map.keyframe(target) else { return };
+    let t_cam_world = k.t_cam_world;
+    let projector = Projector::new(sensor, &t_cam_world);
+    for &id in landmarks {
+        let (Some(k), Some(landmark)) = (map.keyframe(target), map.landmark(id)) else { continue };
+        let Some(projection) = projector.project(&landmark.position) else { continue };
+        let ray = landmark.position - projector.center_world;
+        let distance = ray.norm();
+        if distance < 0.8 * landmark.min_distance_m
+            || distance > 1.2 * landmark.max_distance_m
+            || ray.dot(&landmark.normal) < config.tracking.min_view_cosine * distance
+            || landmark.feature_in(target).is_some()
+        {
+            continue;
+        }
+        let octave = sensor.predict_octave(landmark.max_distance_m, distance);
+        let radius = config.mapping.fuse_radius_px * sensor.scale(octave);
+        let p = (t_cam_world * landmark.position).coords;
+        let mut best = Best::none();
+        k.features.for_each_near(projection.u, projection.v, radius, octave.saturating_sub(1)..=octave, |j| {
+            let f = &k.features.features[j];
+            let m = sensor.measurement(f);
+            let limit = if m.weight_disparity > 0.0 { CHI2_PIXEL_DEPTH } else { CHI2_PIXEL };
+            if f.trust > 0.0 && m.chi2(&m.residual(&sensor.pinhole, &p)) <= limit {
+                best.offer(j, landmark.descriptor.distance(&k.features.descriptors[j]), f.octave);
+            }
+        });
+        if best.distance > config.tracking.hamming_low {
+            continue;
+        }
+        match k.landmarks[best.index] {
+            Some(other) => {
+                let weight = |id| map.landmark(id).map_or(0, |l| map.observation_weight(l));
+                if weight(other) > weight(id) { map.merge_landmarks(other, id) } else { map.merge_landmarks(id, other) }
+            }
+            None => map.add_observation(id, target, best.index),
+        }
+    }
+}

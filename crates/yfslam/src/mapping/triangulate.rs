@@ -1,0 +1,160 @@
+//! Landmarks from two views, for features whose depth is missing or far (ORB-SLAM, IEEE T-RO 2015, section VI-C).
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::config::Config;
+use crate::features::Feature;
+use crate::geometry::{Pose, skew};
+use crate::image::RgbImage;
+use crate::map::{KeyFrame, KeyFrameId, LandmarkId, Map};
+use crate::mapping::color_at;
+use crate::optimize::residual::CHI2_PIXEL;
+use crate::sensor::SensorModel;
+use crate::tracking::search::Best;
+
+/// χ² with one degree of freedom: limit for the distance from the epipolar line.
+const CHI2_LINE: f64 = 3.84;
+
+/// Matches features without landmark between `keyframe` and its best covisible ones and triangulates them.
+pub fn new_landmarks(
+    sensor: &SensorModel,
+    config: &Config,
+    map: &mut Map,
+    keyframe: KeyFrameId,
+    color: &RgbImage,
+) -> Vec<LandmarkId> {
+    let mut created = Vec::new();
+    let Some(k) = map.keyframe(keyframe) else { return created };
+    let neighbours: Vec<KeyFrameId> =
+        k.covisible.iter().take(config.mapping.triangulation_neighbours).map(|(id, _)| *id).collect();
+    for neighbour in neighbours {
+        let (Some(a), Some(b)) = (map.keyframe(keyframe), map.keyframe(neighbour)) else { continue };
+        let t_b_a = b.t_cam_world * a.t_cam_world.inverse();
+        if t_b_a.translation.vector.norm() < sensor.pinhole.bf / sensor.pinhole.fx {
+            continue;
+        }
+        for (i, j) in match_along_epipolar_lines(sensor, config, a, b, &t_b_a) {
+            let (Some(a), Some(b)) = (map.keyframe(keyframe), map.keyframe(neighbour)) else { break };
+            let Some(point) = triangulate(sensor, config, a, b, i, j) else { continue };
+            let raw = a.features.features[i].raw;
+            if let Some(id) = map.insert_landmark(point, keyframe, i, color_at(color, raw), &sensor.scale_factors) {
+                map.add_observation(id, neighbour, j);
+                map.update_landmark(id, &sensor.scale_factors);
+                created.push(id);
+            }
+        }
+    }
+    created
+}
+
+/// Features of a keyframe that may be triangulated: trusted and without landmark.
+fn open_features(k: &KeyFrame) -> Vec<usize> {
+    (0..k.features.len()).filter(|&i| k.landmarks[i].is_none() && k.features.features[i].trust > 0.0).collect()
+}
+
+/// Pairs of feature indices (in a, in b) alike in descriptor and near each other's epipolar line.
+fn match_along_epipolar_lines(
+    sensor: &SensorModel,
+    config: &Config,
+    a: &KeyFrame,
+    b: &KeyFrame,
+    t_b_a: &Pose,
+) -> Vec<(usize, usize)> {
+    let c = &sensor.pinhole;
+    let k_inv = Matrix3::new(1.0 / c.fx, 0.0, -c.cx / c.fx, 0.0, 1.0 / c.fy, -c.cy / c.fy, 0.0, 0.0, 1.0);
+    let rotation = *t_b_a.rotation.to_rotation_matrix().matrix();
+    // x_bᵀ F x_a = 0
+    let fundamental = k_inv.transpose() * skew(&t_b_a.translation.vector) * rotation * k_inv;
+    let candidates = open_features(b);
+    let mut taken = vec![false; b.features.len()];
+    let mut matches = Vec::new();
+    for i in open_features(a) {
+        let f = &a.features.features[i];
+        let line = fundamental * Vector3::new(f64::from(f.u), f64::from(f.v), 1.0);
+        let norm2 = line.x * line.x + line.y * line.y;
+        let mut best = Best::none();
+        for &j in &candidates {
+            let g = &b.features.features[j];
+            let distance = line.x * f64::from(g.u) + line.y * f64::from(g.v) + line.z;
+            let scale = f64::from(sensor.scale(g.octave));
+            if taken[j] || distance * distance > CHI2_LINE * scale * scale * norm2 {
+                continue;
+            }
+            best.offer(j, a.features.descriptors[i].distance(&b.features.descriptors[j]), 0);
+        }
+        if best.is_distinct(config.tracking.hamming_low, config.mapping.triangulation_ratio) {
+            taken[best.index] = true;
+            matches.push((i, best.index));
+        }
+    }
+    matches
+}
+
+/// The world point of a match, if both views agree on it.
+fn triangulate(
+    sensor: &SensorModel,
+    config: &Config,
+    a: &KeyFrame,
+    b: &KeyFrame,
+    i: usize,
+    j: usize,
+) -> Option<Point3<f64>> {
+    let (f, g) = (&a.features.features[i], &b.features.features[j]);
+    let (t_world_a, t_world_b) = (a.t_cam_world.inverse(), b.t_cam_world.inverse());
+    let ray = |f: &Feature| sensor.pinhole.unproject(f64::from(f.u), f64::from(f.v), 1.0).coords;
+    let (ray_a, ray_b) = (t_world_a.rotation * ray(f), t_world_b.rotation * ray(g));
+    let cosine = ray_a.dot(&ray_b) / (ray_a.norm() * ray_b.norm());
+    let (center_a, center_b) = (t_world_a.translation.vector, t_world_b.translation.vector);
+    let from_depth = |f: &Feature, t_world_cam: &Pose| {
+        f.depth_m.map(|z| t_world_cam * sensor.pinhole.unproject(f64::from(f.u), f64::from(f.v), f64::from(z)))
+    };
+    let point = if cosine > 0.0 && cosine < config.mapping.max_parallax_cosine {
+        midpoint(&center_a, &ray_a, &center_b, &ray_b)?
+    } else {
+        from_depth(f, &t_world_a).or_else(|| from_depth(g, &t_world_b))?
+    };
+    for (k, f) in [(a, f), (b, g)] {
+        let p = (k.t_cam_world * point).coords;
+        let m = sensor.measurement(f);
+        if p.z <= 0.01 || m.chi2(&m.residual(&sensor.pinhole, &p)) > m.chi2_limit().max(CHI2_PIXEL) {
+            return None;
+        }
+    }
+    // The ratio of distances must fit the ratio of scales (ORB-SLAM's scale consistency).
+    let ratio_distance = (point.coords - center_a).norm() / (point.coords - center_b).norm();
+    let ratio_scale = f64::from(sensor.scale(f.octave)) / f64::from(sensor.scale(g.octave));
+    let tolerance = 1.5 * f64::from(sensor.scale(1));
+    (ratio_distance < ratio_scale * tolerance && ratio_distance * tolerance > ratio_scale).then_some(point)
+}
+
+/// The point midway between two rays where they are nearest to each other.
+fn midpoint(
+    center_a: &Vector3<f64>,
+    ray_a: &Vector3<f64>,
+    center_b: &Vector3<f64>,
+    ray_b: &Vector3<f64>,
+) -> Option<Point3<f64>> {
+    let (aa, bb, ab) = (ray_a.norm_squared(), ray_b.norm_squared(), ray_a.dot(ray_b));
+    let determinant = aa * bb - ab * ab;
+    if determinant < 1e-12 * aa * bb {
+        return None;
+    }
+    let d = center_b - center_a;
+    let s = (d.dot(ray_a) * bb - d.dot(ray_b) * ab) / determinant;
+    let t = (d.dot(ray_a) * ab - d.dot(ray_b) * aa) / determinant;
+    (s > 0.0 && t > 0.0).then(|| Point3::from((center_a + ray_a * s + center_b + ray_b * t) * 0.5))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn midpoint_of_crossing_rays_is_the_crossing() {
+        let p = Vector3::new(0.3, -0.2, 2.0);
+        let (a, b) = (Vector3::zeros(), Vector3::new(0.5, 0.1, 0.0));
+        let found = midpoint(&a, &((p - a) * 0.7), &b, &((p - b) * 0.4));
+        assert!(found.is_some_and(|q| (q.coords - p).norm() < 1e-12));
+        assert!(midpoint(&a, &p, &b, &p).is_none(), "parallel rays meet nowhere");
+    }
+}

@@ -1,0 +1,109 @@
+//! Local bundle adjustment (ORB-SLAM2, IEEE T-RO 2017, section III-B): a window is copied out of the map, adjusted, and merged back
+//! where the map still has what was copied.
+
+use std::collections::BTreeMap;
+
+use crate::config::{BundleConfig, MappingConfig};
+use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::optimize::schur::{BundleProblem, BundleSummary, Observation};
+use crate::sensor::SensorModel;
+
+/// A copied part of the map: keyframes to adjust, all they see, and keyframes that hold it in place.
+#[derive(Clone, Debug)]
+pub struct Window {
+    problem: BundleProblem,
+    keyframes: Vec<KeyFrameId>,
+    landmarks: Vec<LandmarkId>,
+}
+
+impl Window {
+    /// Copies `keyframe`, its best covisible ones, their landmarks, and the keyframes outside that see most of those.
+    pub fn copy(sensor: &SensorModel, config: &MappingConfig, map: &Map, keyframe: KeyFrameId) -> Option<Self> {
+        let center = map.keyframe(keyframe)?;
+        let mut keyframes = vec![keyframe];
+        keyframes.extend(center.covisible.iter().take(config.window_keyframes.saturating_sub(1)).map(|(id, _)| *id));
+        // The first keyframe defines the world: it is never adjusted.
+        keyframes.retain(|id| map.keyframe(*id).is_some_and(|k| k.sequence > 0));
+        let mut landmarks: Vec<LandmarkId> =
+            keyframes.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.sights().map(|(_, l)| l)).collect();
+        landmarks.sort_unstable();
+        landmarks.dedup();
+        let free_poses = keyframes.len();
+        let mut outside: BTreeMap<KeyFrameId, usize> = BTreeMap::new();
+        for (k, _) in landmarks.iter().filter_map(|l| map.landmark(*l)).flat_map(|l| &l.observations) {
+            if !keyframes[..free_poses].contains(k) {
+                *outside.entry(*k).or_default() += 1;
+            }
+        }
+        let mut outside: Vec<_> = outside.into_iter().collect();
+        outside.sort_by_key(|&(id, count)| (std::cmp::Reverse(count), id));
+        keyframes.extend(outside.iter().take(config.window_fixed).map(|(id, _)| *id));
+        Some(Self::assemble(sensor, map, keyframes, free_poses, landmarks))
+    }
+
+    /// Copies the whole map; all keyframes but the first are adjusted.
+    pub fn whole(sensor: &SensorModel, map: &Map) -> Self {
+        let mut keyframes: Vec<KeyFrameId> =
+            map.keyframes().filter(|(_, k)| k.sequence > 0).map(|(id, _)| id).collect();
+        let free_poses = keyframes.len();
+        keyframes.extend(map.keyframes().filter(|(_, k)| k.sequence == 0).map(|(id, _)| id));
+        let landmarks = map.landmarks().map(|(id, _)| id).collect();
+        Self::assemble(sensor, map, keyframes, free_poses, landmarks)
+    }
+
+    fn assemble(
+        sensor: &SensorModel,
+        map: &Map,
+        keyframes: Vec<KeyFrameId>,
+        free_poses: usize,
+        landmarks: Vec<LandmarkId>,
+    ) -> Self {
+        let index: BTreeMap<KeyFrameId, usize> = keyframes.iter().enumerate().map(|(i, id)| (*id, i)).collect();
+        let mut points = Vec::with_capacity(landmarks.len());
+        let mut observations = Vec::new();
+        for (point, id) in landmarks.iter().enumerate() {
+            let Some(landmark) = map.landmark(*id) else { continue };
+            points.push(landmark.position);
+            for &(k, f) in &landmark.observations {
+                let (Some(&pose), Some(k)) = (index.get(&k), map.keyframe(k)) else { continue };
+                let feature = &k.features.features[f as usize];
+                observations.push(Observation {
+                    pose,
+                    point,
+                    measurement: sensor.measurement(feature),
+                    trust: f64::from(feature.trust),
+                });
+            }
+        }
+        let poses = keyframes.iter().filter_map(|id| map.keyframe(*id)).map(|k| k.t_cam_world).collect();
+        let problem = BundleProblem { camera: sensor.pinhole, poses, free_poses, points, observations };
+        Self { problem, keyframes, landmarks }
+    }
+
+    /// Adjusts the copy: a few robust steps, outliers out, then more steps.
+    pub fn adjust(&mut self, config: &BundleConfig) -> BundleSummary {
+        let first = self.problem.solve(config, config.first_iterations, true);
+        self.problem.drop_outliers();
+        let second = self.problem.solve(config, config.second_iterations, false);
+        self.problem.drop_outliers();
+        BundleSummary { iterations: first.iterations + second.iterations, ..second }
+    }
+
+    /// Writes the adjusted poses and points back and takes out observations that did not fit. What the map no longer has is skipped.
+    pub fn merge(self, sensor: &SensorModel, map: &mut Map) {
+        for (id, pose) in self.keyframes.iter().zip(&self.problem.poses).take(self.problem.free_poses) {
+            map.set_pose(*id, *pose);
+        }
+        for (id, position) in self.landmarks.iter().zip(&self.problem.points) {
+            map.set_position(*id, *position);
+        }
+        for o in &self.problem.observations {
+            if o.trust <= 0.0 {
+                map.remove_observation(self.landmarks[o.point], self.keyframes[o.pose]);
+            }
+        }
+        for id in &self.landmarks {
+            map.update_landmark(*id, &sensor.scale_factors);
+        }
+    }
+}

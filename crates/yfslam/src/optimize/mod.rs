@@ -1,0 +1,8 @@
+//! Non-linear least squares over poses and points.
+//!
+//! [`residual`] has the one residual everything shares, [`pose_only`] refines a single pose, [`schur`] adjusts a window of
+//! poses and points together.
+
+pub mod pose_only;
+pub mod residual;
+pub mod schur;

@@ -1,0 +1,210 @@
+//! Motion-only bundle adjustment: the pose of one frame from landmarks that stay fixed (ORB-SLAM2, IEEE T-RO 2017, section III-B).
+//!
+//! In: a first pose, points in the world and their measurements. Out: the pose and which measurements fit it.
+
+use nalgebra::{Matrix6, Point3, Vector3, Vector6};
+
+use crate::config::PoseOptimizerConfig;
+use crate::geometry::{Pinhole, Pose, perturbed};
+use crate::optimize::residual::{Measurement, huber, projection_jacobian};
+
+/// A landmark seen in the frame whose pose is wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct PoseObservation {
+    /// The landmark in the world, m.
+    pub point_world: Point3<f64>,
+    /// Where it was seen.
+    pub measurement: Measurement,
+    /// How far it may be trusted, in [0, 1]; scales the information.
+    pub trust: f64,
+    /// Set by the optimiser: whether the observation fits the pose.
+    pub inlier: bool,
+}
+
+/// Refines `t_cam_world` in place and marks the inliers among `observations`; returns their number.
+///
+/// Each round starts from the observations that fitted the last; the robust kernel is dropped after
+/// `robust_rounds`, when the gross errors are gone.
+pub fn optimize_pose(
+    camera: &Pinhole,
+    config: &PoseOptimizerConfig,
+    t_cam_world: &mut Pose,
+    observations: &mut [PoseObservation],
+) -> usize {
+    for o in observations.iter_mut() {
+        o.inlier = true;
+    }
+    let mut inliers = observations.len();
+    for round in 0..config.rounds {
+        if inliers < 3 {
+            break;
+        }
+        let robust = round < config.robust_rounds;
+        minimise(camera, config, robust, t_cam_world, observations);
+        inliers = classify(camera, t_cam_world, observations);
+    }
+    inliers
+}
+
+/// Levenberg–Marquardt over the six parameters of a left perturbation.
+fn minimise(
+    camera: &Pinhole,
+    config: &PoseOptimizerConfig,
+    robust: bool,
+    pose: &mut Pose,
+    observations: &[PoseObservation],
+) {
+    let mut lambda = config.initial_damping;
+    let (mut h, mut b, mut cost) = linearise(camera, robust, pose, observations);
+    for _ in 0..config.iterations {
+        let mut damped = h;
+        for i in 0..6 {
+            damped[(i, i)] += lambda * h[(i, i)].max(1e-9);
+        }
+        let Some(step) = damped.cholesky().map(|c| c.solve(&b)) else {
+            return;
+        };
+        let candidate = perturbed(&step, pose);
+        let (h_new, b_new, cost_new) = linearise(camera, robust, &candidate, observations);
+        // A comparison with NaN is false: a step into nonsense is never taken.
+        if cost_new <= cost {
+            let gain = cost - cost_new;
+            *pose = candidate;
+            (h, b, cost) = (h_new, b_new, cost_new);
+            lambda *= 0.2;
+            if gain < config.relative_tolerance * cost {
+                return;
+            }
+        } else {
+            lambda *= 10.0;
+            if lambda > 1e6 {
+                return;
+            }
+        }
+    }
+}
+
+/// Normal equations H, b and the robust cost at `pose`, over the inliers.
+fn linearise(
+    camera: &Pinhole,
+    robust: bool,
+    pose: &Pose,
+    observations: &[PoseObservation],
+) -> (Matrix6<f64>, Vector6<f64>, f64) {
+    let rotation = pose.rotation.to_rotation_matrix();
+    let translation = pose.translation.vector;
+    // Upper triangle of H, row-wise: 21 running sums stay in registers where a Matrix6 would go through memory.
+    let mut h = [0.0f64; 21];
+    let mut b = [0.0f64; 6];
+    let mut cost = 0.0;
+    for o in observations.iter().filter(|o| o.inlier && o.trust > 0.0) {
+        let p: Vector3<f64> = rotation * o.point_world.coords + translation;
+        if p.z <= 1e-3 {
+            cost += o.trust * o.measurement.chi2_limit();
+            continue;
+        }
+        let r = o.measurement.residual(camera, &p);
+        let chi2 = o.measurement.chi2(&r);
+        let (loss, weight) = if robust { huber(chi2, o.measurement.chi2_limit()) } else { (chi2, 1.0) };
+        cost += o.trust * loss;
+        let j = projection_jacobian(camera, &p);
+        let info = o.measurement.information() * (weight * o.trust);
+        // d p / d(ρ, φ) = [I | −[p]×], hence each row a of J extends to (a, p × a).
+        for k in 0..3 {
+            let a = Vector3::new(j[(k, 0)], j[(k, 1)], j[(k, 2)]);
+            let c = p.cross(&a);
+            let row = [a.x, a.y, a.z, c.x, c.y, c.z];
+            let w = info[k];
+            let mut n = 0;
+            for i in 0..6 {
+                let wi = w * row[i];
+                b[i] += wi * r[k];
+                for &rj in &row[i..] {
+                    h[n] += wi * rj;
+                    n += 1;
+                }
+            }
+        }
+    }
+    let mut full = Matrix6::zeros();
+    let mut n = 0;
+    for i in 0..6 {
+        for j in i..6 {
+            full[(i, j)] = h[n];
+            full[(j, i)] = h[n];
+            n += 1;
+        }
+    }
+    (full, Vector6::from_row_slice(&b), cost)
+}
+
+/// Marks each observation by the χ² test at `pose`; returns the number of inliers.
+fn classify(camera: &Pinhole, pose: &Pose, observations: &mut [PoseObservation]) -> usize {
+    let rotation = pose.rotation.to_rotation_matrix();
+    let translation = pose.translation.vector;
+    let mut inliers = 0;
+    for o in observations {
+        let p = rotation * o.point_world.coords + translation;
+        let m = &o.measurement;
+        o.inlier = p.z > 1e-3 && m.chi2(&m.residual(camera, &p)) <= m.chi2_limit();
+        inliers += usize::from(o.inlier);
+    }
+    inliers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::se3_exp;
+
+    fn observations(camera: &Pinhole, truth: &Pose) -> Vec<PoseObservation> {
+        let t_world_cam = truth.inverse();
+        (0..60)
+            .map(|i| {
+                let (u, v) = (40.0 + 9.5 * f64::from(i), 30.0 + f64::from(i * 37 % 420));
+                let z = 1.0 + 0.1 * f64::from(i * 13 % 30);
+                PoseObservation {
+                    point_world: t_world_cam * camera.unproject(u, v, z),
+                    measurement: Measurement {
+                        u,
+                        v,
+                        disparity: camera.bf / z,
+                        weight_px: 1.0,
+                        weight_disparity: if i % 4 == 0 { 0.0 } else { 1.0 },
+                    },
+                    trust: 1.0,
+                    inlier: true,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_pose_is_recovered_from_a_far_start_despite_outliers() {
+        let camera = Pinhole { fx: 520.0, fy: 510.0, cx: 320.0, cy: 240.0, bf: 40.0 };
+        let truth = se3_exp(&Vector6::new(0.3, -0.2, 0.1, 0.05, -0.4, 0.2));
+        let mut observations = observations(&camera, &truth);
+        for o in observations.iter_mut().step_by(6) {
+            o.measurement.v += 70.0;
+        }
+        let mut pose = se3_exp(&Vector6::new(0.05, 0.04, -0.03, 0.03, -0.05, 0.02)) * truth;
+        let inliers = optimize_pose(&camera, &PoseOptimizerConfig::default(), &mut pose, &mut observations);
+        let error = pose * truth.inverse();
+        assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle() < 1e-6, "{error}");
+        assert_eq!(inliers, 50);
+    }
+
+    #[test]
+    fn a_distrusted_observation_does_not_move_the_pose() {
+        let camera = Pinhole { fx: 520.0, fy: 510.0, cx: 320.0, cy: 240.0, bf: 40.0 };
+        let truth = Pose::translation(0.1, 0.0, 0.2);
+        let mut observations = observations(&camera, &truth);
+        for o in observations.iter_mut().take(20) {
+            o.measurement.u += 2.0;
+            o.trust = 0.0;
+        }
+        let mut pose = truth;
+        optimize_pose(&camera, &PoseOptimizerConfig::default(), &mut pose, &mut observations);
+        assert!((pose * truth.inverse()).translation.vector.norm() < 1e-9);
+    }
+}

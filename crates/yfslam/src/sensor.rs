@@ -1,0 +1,79 @@
+//! What every stage needs to know of the camera and of the noise of its features.
+
+use crate::camera::Camera;
+use crate::config::Config;
+use crate::features::{Feature, ImageBounds};
+use crate::geometry::Pinhole;
+use crate::optimize::residual::Measurement;
+
+/// Camera, pyramid and noise model, resolved from the configuration once.
+#[derive(Clone, Debug)]
+pub struct SensorModel {
+    /// The calibration.
+    pub camera: Camera,
+    /// Its distortion-free part.
+    pub pinhole: Pinhole,
+    /// Extent of the undistorted image.
+    pub bounds: ImageBounds,
+    /// Scale of each pyramid level relative to the finest.
+    pub scale_factors: Vec<f32>,
+    /// 1/σ² of a corner's position per level, px⁻².
+    weights_px: Vec<f64>,
+    /// 1/σ² of the disparity, px⁻².
+    weight_disparity: f64,
+    /// Depth up to which a feature's depth is trusted to make a landmark at once, m.
+    pub close_limit_m: f64,
+    /// Depth beyond which the sensor's readings are ignored, m.
+    max_depth_m: f64,
+}
+
+impl SensorModel {
+    /// Resolves the configuration for a camera; `scale_factors` are those of the extractor.
+    pub fn new(camera: &Camera, config: &Config, scale_factors: &[f32]) -> Self {
+        let pinhole = Pinhole::from(camera);
+        // σ_z = n z² makes the disparity bf / z uncertain by bf·n, whatever the depth.
+        let sigma_disparity = camera.bf * config.depth.noise_per_m;
+        Self {
+            camera: camera.clone(),
+            pinhole,
+            bounds: ImageBounds::of(camera),
+            scale_factors: scale_factors.to_vec(),
+            weights_px: scale_factors.iter().map(|s| (config.depth.corner_sigma_px * f64::from(*s)).powi(-2)).collect(),
+            weight_disparity: sigma_disparity.powi(-2),
+            close_limit_m: config.depth.close_limit_baselines * camera.bf / camera.fx,
+            max_depth_m: config.depth.max_m,
+        }
+    }
+
+    /// Number of pyramid levels.
+    pub fn levels(&self) -> usize {
+        self.scale_factors.len()
+    }
+
+    /// Scale of a pyramid level.
+    #[inline]
+    pub fn scale(&self, octave: u8) -> f32 {
+        self.scale_factors.get(usize::from(octave)).copied().unwrap_or(1.0)
+    }
+
+    /// The feature as the optimisers want it.
+    #[inline]
+    pub fn measurement(&self, feature: &Feature) -> Measurement {
+        let depth = feature.depth_m.map(f64::from).filter(|z| *z < self.max_depth_m);
+        Measurement {
+            u: f64::from(feature.u),
+            v: f64::from(feature.v),
+            disparity: depth.map_or(0.0, |z| self.pinhole.bf / z),
+            weight_px: self.weights_px.get(usize::from(feature.octave)).copied().unwrap_or(0.0),
+            weight_disparity: if depth.is_some() { self.weight_disparity } else { 0.0 },
+        }
+    }
+
+    /// The level at which a landmark should be found from `distance_m`, given its `max_distance_m` (ORB-SLAM, IEEE T-RO 2015, V-D).
+    #[inline]
+    pub fn predict_octave(&self, max_distance_m: f64, distance_m: f64) -> u8 {
+        let ratio = (max_distance_m / distance_m) as f32;
+        // The first level whose scale reaches the ratio; a handful of comparisons beat a logarithm.
+        self.scale_factors.iter().position(|s| *s >= ratio).unwrap_or(self.levels().saturating_sub(1)) as u8
+    }
+}

@@ -1,0 +1,285 @@
+//! The whole path from a frame to its pose, on one page.
+
+use std::time::{Duration, Instant};
+
+use crate::camera::Camera;
+use crate::config::Config;
+use crate::detection::{Detection, Detector};
+use crate::detector_thread::DetectorThread;
+use crate::dynamic::{DynamicFilter, Method, Region};
+use crate::features::{Features, OrbExtractor};
+use crate::frame::RgbdFrame;
+use crate::geometry::Pose;
+use crate::image::{GrayImage, gray_from_rgb};
+use crate::map::{KeyFrameId, Map};
+use crate::mapping::Mapper;
+use crate::sensor::SensorModel;
+use crate::tracking::{TrackedFrame, Tracker, TrackingState};
+
+/// What became of one frame.
+#[derive(Clone, Debug)]
+pub struct Tracked {
+    /// Time of the frame, ns.
+    pub timestamp_ns: i64,
+    /// Whether the pose is known.
+    pub state: TrackingState,
+    /// Pose of the camera in the world as known now; `None` unless tracking.
+    pub t_world_cam: Option<Pose>,
+    /// Whether the frame became a keyframe.
+    pub is_keyframe: bool,
+    /// Landmarks that fit the pose.
+    pub inliers: usize,
+    /// Where the time went.
+    pub times: StageTimes,
+}
+
+/// Why a system could not be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupError {
+    /// A movable class that the detector does not know.
+    #[error("dynamic.movable names the class '{name}', which the detector does not know; it knows: {known}")]
+    UnknownClass {
+        /// The class asked for.
+        name: String,
+        /// The classes the detector has.
+        known: String,
+    },
+    /// A thread could not be started.
+    #[error("the detector's thread could not be started: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// Wall time of the stages of one frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StageTimes {
+    /// Grey image and feature extraction.
+    pub features: Duration,
+    /// Waiting for the detector, which ran beside feature extraction.
+    pub detector_wait: Duration,
+    /// Dynamic filter, both doors.
+    pub dynamic: Duration,
+    /// Pose from last frame and local map.
+    pub tracking: Duration,
+    /// Keyframe insertion and local bundle adjustment; zero for frames that are no keyframe.
+    pub mapping: Duration,
+}
+
+/// Where a tracked frame hangs in the map.
+#[derive(Clone, Copy, Debug)]
+struct Anchor {
+    timestamp_ns: i64,
+    reference: KeyFrameId,
+    t_cam_reference: Pose,
+}
+
+/// RGB-D SLAM: frames in, poses out.
+pub struct Slam {
+    config: Config,
+    sensor: SensorModel,
+    extractor: OrbExtractor,
+    gray: GrayImage,
+    extracted: Features,
+    tracker: Tracker,
+    mapper: Mapper,
+    map: Map,
+    state: TrackingState,
+    anchors: Vec<Anchor>,
+    filter: DynamicFilter,
+    detector: Option<DetectorThread>,
+    /// Indices of the classes that can move.
+    movable_classes: Vec<usize>,
+    movable: Vec<Detection>,
+    detector_failures: usize,
+}
+
+impl Slam {
+    /// A system without a map, for one camera. Without a detector, boxes can still come with the frames.
+    ///
+    /// # Errors
+    /// If the detector does not know a movable class of the configuration, or its thread cannot be started.
+    pub fn new(config: Config, camera: &Camera, detector: Option<Box<dyn Detector>>) -> Result<Self, SetupError> {
+        let extractor = OrbExtractor::new(&config.features);
+        // A method that asks for no boxes needs no detector.
+        let detector = detector.filter(|_| config.dynamic.method != Method::None);
+        let mut movable_classes = Vec::new();
+        if let Some(detector) = &detector {
+            let known = detector.class_names();
+            for name in &config.dynamic.movable {
+                movable_classes.push(
+                    known
+                        .iter()
+                        .position(|k| k == name)
+                        .ok_or_else(|| SetupError::UnknownClass { name: name.clone(), known: known.join(", ") })?,
+                );
+            }
+        }
+        Ok(Self {
+            filter: DynamicFilter::new(config.dynamic.seed),
+            detector: detector.map(DetectorThread::spawn).transpose()?,
+            movable_classes,
+            movable: Vec::new(),
+            detector_failures: 0,
+            sensor: SensorModel::new(camera, &config, extractor.scale_factors()),
+            config,
+            extractor,
+            gray: GrayImage::default(),
+            extracted: Features::default(),
+            tracker: Tracker::default(),
+            mapper: Mapper::default(),
+            map: Map::default(),
+            state: TrackingState::NotInitialized,
+            anchors: Vec::new(),
+        })
+    }
+
+    /// Takes one frame through all stages.
+    pub fn track(&mut self, frame: &RgbdFrame) -> Tracked {
+        let mut times = StageTimes::default();
+        let mut clock = Stopwatch::start();
+        let detecting = self.start_detector(frame);
+        self.extract(frame);
+        times.features = clock.lap();
+        self.collect_boxes(frame, detecting);
+        times.detector_wait = clock.lap();
+        let features = &mut self.tracker.current.features;
+        self.filter.before_pose(&self.config.dynamic, &self.movable, &frame.depth, features);
+        times.dynamic = clock.lap();
+        let tracked = match self.state {
+            TrackingState::NotInitialized => self.has_enough_to_start(),
+            TrackingState::Tracking | TrackingState::Lost => {
+                self.tracker.estimate(&self.sensor, &self.config, &self.map)
+                    && self.tracker.track_local_map(&self.sensor, &self.config, &mut self.map)
+            }
+        };
+        if tracked {
+            self.tracker.accept(&self.map);
+        } else {
+            self.tracker.reject();
+        }
+        times.tracking = clock.lap();
+        let is_keyframe = tracked && self.tracker.wants_keyframe(&self.sensor, &self.config, &self.map);
+        if is_keyframe {
+            let current = &self.tracker.current;
+            let keyframe = self.mapper.insert(&self.sensor, &self.config, &mut self.map, current, &frame.color);
+            self.tracker.became_keyframe(keyframe, &self.map);
+            times.mapping = clock.lap();
+        }
+        self.state = match (tracked, self.state) {
+            (true, _) => TrackingState::Tracking,
+            (false, TrackingState::NotInitialized) => TrackingState::NotInitialized,
+            (false, _) => TrackingState::Lost,
+        };
+        self.note_anchor(frame.timestamp_ns);
+        Tracked {
+            timestamp_ns: frame.timestamp_ns,
+            state: self.state,
+            t_world_cam: tracked.then(|| self.tracker.current.t_cam_world.inverse()),
+            is_keyframe,
+            inliers: self.tracker.inliers,
+            times,
+        }
+    }
+
+    /// Hands the image to the detector unless the frame brings its boxes along. Returns whether boxes are to be waited for.
+    fn start_detector(&mut self, frame: &RgbdFrame) -> bool {
+        match &mut self.detector {
+            Some(detector) if frame.detections.is_none() => {
+                detector.start(&frame.color);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// This frame's boxes of movable objects. A frame the detector fails on counts as one without boxes: tracks carry it.
+    fn collect_boxes(&mut self, frame: &RgbdFrame, detecting: bool) {
+        self.movable.clear();
+        if let Some(known) = &frame.detections {
+            self.movable.extend_from_slice(known);
+        } else if let (true, Some(detector)) = (detecting, &mut self.detector) {
+            match detector.finish() {
+                Ok(boxes) => self.movable.extend(boxes.iter().filter(|d| self.movable_classes.contains(&d.class))),
+                Err(error) => {
+                    tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
+                    self.detector_failures += 1;
+                }
+            }
+        }
+    }
+
+    /// Features of the frame with depth, undistorted.
+    fn extract(&mut self, frame: &RgbdFrame) {
+        gray_from_rgb(&frame.color, &mut self.gray);
+        self.extractor.extract(&self.gray, &mut self.extracted);
+        self.tracker.begin_frame(frame.timestamp_ns);
+        let current = &mut self.tracker.current;
+        current.features.fill(&self.extracted, &frame.depth, &self.sensor.camera, self.sensor.bounds);
+        current.clear_sights();
+    }
+
+    /// Whether the first frame has the features, and the depths, that a map needs.
+    fn has_enough_to_start(&self) -> bool {
+        let features = &self.tracker.current.features.features;
+        let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
+        features.len() >= self.config.tracking.init_min_features
+            && with_depth >= self.config.tracking.init_min_landmarks
+    }
+
+    fn note_anchor(&mut self, timestamp_ns: i64) {
+        if self.state == TrackingState::Tracking
+            && let Some((reference, t_cam_reference)) = self.tracker.current.reference
+        {
+            self.anchors.push(Anchor { timestamp_ns, reference, t_cam_reference });
+        }
+    }
+
+    /// Poses of all tracked frames (world from camera) as the map has them now.
+    pub fn trajectory(&self) -> Vec<(i64, Pose)> {
+        self.anchors
+            .iter()
+            .filter_map(|a| {
+                let t_cam_world = a.t_cam_reference * self.map.keyframe_pose(a.reference)?;
+                Some((a.timestamp_ns, t_cam_world.inverse()))
+            })
+            .collect()
+    }
+
+    /// Frames on which the detector failed.
+    pub fn detector_failures(&self) -> usize {
+        self.detector_failures
+    }
+
+    /// The last frame: features with their trust, matches, pose.
+    pub fn last_frame(&self) -> &TrackedFrame {
+        &self.tracker.current
+    }
+
+    /// The boxes of movable objects in the last frame, at any score.
+    pub fn last_boxes(&self) -> &[Detection] {
+        &self.movable
+    }
+
+    /// The parts of the last frame that were found to move.
+    pub fn moving_regions(&self) -> &[Region] {
+        self.filter.regions()
+    }
+
+    /// The map.
+    pub fn map(&self) -> &Map {
+        &self.map
+    }
+}
+
+/// Measures consecutive stages.
+struct Stopwatch(Instant);
+
+impl Stopwatch {
+    fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    fn lap(&mut self) -> Duration {
+        let now = Instant::now();
+        now.duration_since(std::mem::replace(&mut self.0, now))
+    }
+}

@@ -1,0 +1,127 @@
+//! The frame being tracked: its features and what they are matched to.
+
+use nalgebra::Point3;
+
+use crate::config::PoseOptimizerConfig;
+use crate::features::FrameFeatures;
+use crate::geometry::Pose;
+use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::optimize::pose_only::{PoseObservation, optimize_pose};
+use crate::sensor::SensorModel;
+
+/// A point that a feature is matched to.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight {
+    /// The landmark; `None` for a point borrowed from the last frame's depth.
+    pub landmark: Option<LandmarkId>,
+    /// Where it is in the world, m.
+    pub point_world: Point3<f64>,
+}
+
+/// A frame with its pose and matches. Buffers are reused from frame to frame.
+#[derive(Clone, Debug, Default)]
+pub struct TrackedFrame {
+    /// Time of the frame, ns.
+    pub timestamp_ns: i64,
+    /// What was seen.
+    pub features: FrameFeatures,
+    /// What each feature is matched to.
+    pub sights: Vec<Option<Sight>>,
+    /// Maps world points into this camera.
+    pub t_cam_world: Pose,
+    /// The keyframe it is tied to, and its pose seen from there, `t_cam_reference`.
+    pub reference: Option<(KeyFrameId, Pose)>,
+    observations: Vec<PoseObservation>,
+    observed: Vec<u32>,
+    nearest: Vec<(f32, u32)>,
+}
+
+impl TrackedFrame {
+    /// Forgets all matches.
+    pub fn clear_sights(&mut self) {
+        self.sights.clear();
+        self.sights.resize(self.features.len(), None);
+    }
+
+    /// Features that may be matched: trusted and not matched yet.
+    #[inline]
+    pub fn is_open(&self, feature: usize) -> bool {
+        self.sights[feature].is_none() && self.features.features[feature].trust > 0.0
+    }
+
+    /// Number of matched features.
+    pub fn matched(&self) -> usize {
+        self.sights.iter().flatten().count()
+    }
+
+    /// Refines the pose from all matches and drops those that do not fit. Returns the number of inliers that are landmarks of the
+    /// map with more than a single sight's worth of evidence.
+    pub fn refine_pose(&mut self, sensor: &SensorModel, config: &PoseOptimizerConfig) -> usize {
+        self.observations.clear();
+        self.observed.clear();
+        for (i, sight) in self.sights.iter().enumerate() {
+            let Some(sight) = sight else { continue };
+            let feature = &self.features.features[i];
+            self.observed.push(i as u32);
+            self.observations.push(PoseObservation {
+                point_world: sight.point_world,
+                measurement: sensor.measurement(feature),
+                trust: f64::from(feature.trust),
+                inlier: true,
+            });
+        }
+        optimize_pose(&sensor.pinhole, config, &mut self.t_cam_world, &mut self.observations);
+        let mut on_map = 0;
+        for (&i, o) in self.observed.iter().zip(&self.observations) {
+            let sight = &mut self.sights[i as usize];
+            if !o.inlier {
+                *sight = None;
+            } else if sight.is_some_and(|s| s.landmark.is_some()) {
+                on_map += 1;
+            }
+        }
+        on_map
+    }
+
+    /// Lends unmatched features with depth to the next frame as points: all close ones, at least the `at_least` closest. They never
+    /// enter the map.
+    pub fn borrow_depth_points(&mut self, sensor: &SensorModel, at_least: usize) {
+        let t_world_cam = self.t_cam_world.inverse();
+        self.nearest.clear();
+        for (i, f) in self.features.features.iter().enumerate() {
+            if let (Some(z), true) = (f.depth_m, self.is_open(i)) {
+                self.nearest.push((z, i as u32));
+            }
+        }
+        self.nearest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for (n, &(z, i)) in self.nearest.iter().enumerate() {
+            if f64::from(z) > sensor.close_limit_m && n >= at_least {
+                break;
+            }
+            let f = &self.features.features[i as usize];
+            let point = sensor.pinhole.unproject(f64::from(f.u), f64::from(f.v), f64::from(z));
+            self.sights[i as usize] = Some(Sight { landmark: None, point_world: t_world_cam * point });
+        }
+    }
+
+    /// Brings pose and matched points up to date after the map moved; matches to landmarks that are gone are dropped.
+    pub fn follow_map(&mut self, map: &Map) {
+        if let Some((reference, t_cam_reference)) = self.reference
+            && let Some(t_reference_world) = map.keyframe_pose(reference)
+        {
+            self.t_cam_world = t_cam_reference * t_reference_world;
+        }
+        for sight in &mut self.sights {
+            if let Some(Sight { landmark: Some(id), .. }) = *sight {
+                *sight = map.landmark(id).map(|l| Sight { landmark: Some(id), point_world: l.position });
+            }
+        }
+    }
+
+    /// Ties the frame to a keyframe, so that it moves along when the map is corrected.
+    pub fn tie_to(&mut self, reference: KeyFrameId, map: &Map) {
+        self.reference = map
+            .keyframe_pose(reference)
+            .map(|t_reference_world| (reference, self.t_cam_world * t_reference_world.inverse()));
+    }
+}

@@ -1,0 +1,226 @@
+//! Matching by projection (ORB-SLAM, IEEE T-RO 2015, sections V-B and V-D).
+//!
+//! In: a frame with a predicted pose, and points with descriptors. Out: new entries in the frame's `sights`.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+use crate::config::TrackingConfig;
+use crate::features::Descriptor;
+use crate::features::matching::RotationHistogram;
+use crate::map::{KeyFrame, LandmarkId, Map};
+use crate::sensor::SensorModel;
+use crate::tracking::frame::{Sight, TrackedFrame};
+
+/// The camera pose in the form projection loops want.
+pub struct Projector<'a> {
+    sensor: &'a SensorModel,
+    rotation: Matrix3<f64>,
+    translation: Vector3<f64>,
+    /// The camera's centre in the world, m.
+    pub center_world: Point3<f64>,
+}
+
+/// A point projected into the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Projection {
+    /// Undistorted column, px.
+    pub u: f32,
+    /// Undistorted row, px.
+    pub v: f32,
+    /// Depth, m.
+    pub z_m: f32,
+}
+
+impl<'a> Projector<'a> {
+    /// Prepares projections into the camera at `t_cam_world`.
+    pub fn new(sensor: &'a SensorModel, t_cam_world: &Isometry3<f64>) -> Self {
+        Self {
+            sensor,
+            rotation: *t_cam_world.rotation.to_rotation_matrix().matrix(),
+            translation: t_cam_world.translation.vector,
+            center_world: t_cam_world.inverse_transform_point(&Point3::origin()),
+        }
+    }
+
+    /// Projects a world point; `None` behind the camera or outside the image.
+    #[inline]
+    pub fn project(&self, point_world: &Point3<f64>) -> Option<Projection> {
+        let p = self.rotation * point_world.coords + self.translation;
+        if p.z <= 0.01 {
+            return None;
+        }
+        let [u, v] = self.sensor.pinhole.project(&p);
+        let (u, v) = (u as f32, v as f32);
+        self.sensor.bounds.contains(u, v).then_some(Projection { u, v, z_m: p.z as f32 })
+    }
+
+    /// Whether a feature's depth is compatible with the projection: their disparities differ by less than `radius` px.
+    #[inline]
+    pub fn depth_agrees(&self, depth_m: Option<f32>, projection: &Projection, radius: f32) -> bool {
+        let bf = self.sensor.pinhole.bf as f32;
+        depth_m.is_none_or(|z| (bf / z - bf / projection.z_m).abs() <= radius)
+    }
+}
+
+/// The two nearest descriptors seen so far, with the octave of each.
+#[derive(Clone, Copy, Debug)]
+pub struct Best {
+    /// Index of the nearest feature.
+    pub index: usize,
+    /// Its Hamming distance.
+    pub distance: u32,
+    octave: u8,
+    second_distance: u32,
+    second_octave: u8,
+}
+
+impl Best {
+    /// Nothing seen yet.
+    pub fn none() -> Self {
+        Self { index: usize::MAX, distance: u32::MAX, octave: 0, second_distance: u32::MAX, second_octave: 0 }
+    }
+
+    /// Takes a candidate into account.
+    #[inline]
+    pub fn offer(&mut self, index: usize, distance: u32, octave: u8) {
+        if distance < self.distance {
+            (self.second_distance, self.second_octave) = (self.distance, self.octave);
+            (self.index, self.distance, self.octave) = (index, distance, octave);
+        } else if distance < self.second_distance {
+            (self.second_distance, self.second_octave) = (distance, octave);
+        }
+    }
+
+    /// Whether the nearest is within `limit` and nearer than `ratio` times the second-nearest.
+    pub fn is_distinct(&self, limit: u32, ratio: f32) -> bool {
+        self.distance <= limit
+            && (self.second_distance == u32::MAX || (self.distance as f32) < ratio * self.second_distance as f32)
+    }
+
+    /// As [`Best::is_distinct`], where a rival at another octave does not count.
+    pub fn is_distinct_in_octave(&self, limit: u32, ratio: f32) -> bool {
+        self.distance <= limit
+            && (self.octave != self.second_octave
+                || self.second_distance == u32::MAX
+                || (self.distance as f32) <= ratio * self.second_distance as f32)
+    }
+}
+
+/// Matches the points of `last` around their projection into `current`. Returns the number of matches.
+pub fn search_last_frame(
+    sensor: &SensorModel,
+    config: &TrackingConfig,
+    last: &TrackedFrame,
+    current: &mut TrackedFrame,
+    radius_px: f32,
+) -> usize {
+    let projector = Projector::new(sensor, &current.t_cam_world);
+    let center_in_last = last.t_cam_world * projector.center_world;
+    let baseline = sensor.pinhole.bf / sensor.pinhole.fx;
+    let top = (sensor.levels() - 1) as u8;
+    let mut rotation = RotationHistogram::default();
+    for (i, sight) in last.sights.iter().enumerate() {
+        let Some(sight) = sight else { continue };
+        let Some(projection) = projector.project(&sight.point_world) else { continue };
+        let seen = &last.features.features[i];
+        let radius = radius_px * sensor.scale(seen.octave);
+        // A camera that moved forward sees the point larger, hence at the same or a coarser level; backward alike.
+        let octaves = if center_in_last.z > baseline {
+            seen.octave..=top
+        } else if center_in_last.z < -baseline {
+            0..=seen.octave
+        } else {
+            seen.octave.saturating_sub(1)..=(seen.octave + 1).min(top)
+        };
+        let descriptor = &last.features.descriptors[i];
+        let mut best = Best::none();
+        current.features.for_each_near(projection.u, projection.v, radius, octaves, |j| {
+            let f = &current.features.features[j];
+            if current.is_open(j) && projector.depth_agrees(f.depth_m, &projection, radius) {
+                best.offer(j, descriptor.distance(&current.features.descriptors[j]), f.octave);
+            }
+        });
+        if best.distance <= config.hamming_high {
+            current.sights[best.index] = Some(*sight);
+            rotation.add(seen.angle_rad - current.features.features[best.index].angle_rad, best.index as u32);
+        }
+    }
+    rotation.for_each_outlier(|j| current.sights[j as usize] = None);
+    current.matched()
+}
+
+/// Matches the landmarks of a keyframe by descriptor alone. Returns the number of matches.
+pub fn search_keyframe(config: &TrackingConfig, keyframe: &KeyFrame, map: &Map, current: &mut TrackedFrame) -> usize {
+    let mut rotation = RotationHistogram::default();
+    for (i, id) in keyframe.sights() {
+        let Some(landmark) = map.landmark(id) else { continue };
+        let descriptor = &keyframe.features.descriptors[i];
+        let mut best = Best::none();
+        for (j, d) in current.features.descriptors.iter().enumerate() {
+            if current.is_open(j) {
+                best.offer(j, descriptor.distance(d), 0);
+            }
+        }
+        if best.is_distinct(config.hamming_low, config.reference_ratio) {
+            current.sights[best.index] = Some(Sight { landmark: Some(id), point_world: landmark.position });
+            let turn = keyframe.features.features[i].angle_rad - current.features.features[best.index].angle_rad;
+            rotation.add(turn, best.index as u32);
+        }
+    }
+    rotation.for_each_outlier(|j| current.sights[j as usize] = None);
+    current.matched()
+}
+
+/// Matches landmarks of the local map that the frame does not see yet. `visible` is refilled with those that lie in view.
+pub fn search_local_map(
+    sensor: &SensorModel,
+    config: &TrackingConfig,
+    map: &Map,
+    landmarks: &[LandmarkId],
+    current: &mut TrackedFrame,
+    visible: &mut Vec<LandmarkId>,
+) {
+    visible.clear();
+    let projector = Projector::new(sensor, &current.t_cam_world);
+    for &id in landmarks {
+        let Some(landmark) = map.landmark(id) else { continue };
+        let Some(projection) = projector.project(&landmark.position) else { continue };
+        let ray = landmark.position - projector.center_world;
+        let distance = ray.norm();
+        if distance < 0.8 * landmark.min_distance_m || distance > 1.2 * landmark.max_distance_m {
+            continue;
+        }
+        let cosine = ray.dot(&landmark.normal) / distance;
+        if cosine < config.min_view_cosine {
+            continue;
+        }
+        visible.push(id);
+        let octave = sensor.predict_octave(landmark.max_distance_m, distance);
+        let radius = config.local_radius_factor
+            * sensor.scale(octave)
+            * if cosine > 0.998 { config.local_radius_narrow_px } else { config.local_radius_px };
+        let best = best_near(current, &projector, &projection, radius, octave, &landmark.descriptor);
+        if best.is_distinct_in_octave(config.hamming_high, config.local_ratio) {
+            current.sights[best.index] = Some(Sight { landmark: Some(id), point_world: landmark.position });
+        }
+    }
+}
+
+/// The open feature around a projection whose descriptor is nearest, at the predicted octave or one finer.
+fn best_near(
+    current: &TrackedFrame,
+    projector: &Projector<'_>,
+    projection: &Projection,
+    radius: f32,
+    octave: u8,
+    descriptor: &Descriptor,
+) -> Best {
+    let mut best = Best::none();
+    current.features.for_each_near(projection.u, projection.v, radius, octave.saturating_sub(1)..=octave, |j| {
+        let f = &current.features.features[j];
+        if current.is_open(j) && projector.depth_agrees(f.depth_m, projection, radius) {
+            best.offer(j, descriptor.distance(&current.features.descriptors[j]), f.octave);
+        }
+    });
+    best
+}
