@@ -226,6 +226,8 @@ config_section! {
         edge_px: f32 = 6.0,
         /// Features that must stay trusted; else the least certain boxes are given up.
         min_trusted: usize = 60,
+        /// Features asked for at most, as a multiple of `features.count`, to make up for those on moving bodies. NGD-SLAM asks for 1.5.
+        max_extra_features: f64 = 2.5,
         /// Seed of the random draws.
         seed: u64 = 0,
     }

@@ -72,6 +72,11 @@ impl OrbExtractor {
         &self.scale_factors
     }
 
+    /// Changes how many features the next images are asked for.
+    pub fn set_count(&mut self, count: usize) {
+        self.config.count = count;
+    }
+
     /// Replaces `out` by the features of `gray`; an image too small for a patch has none.
     pub fn extract(&mut self, gray: &GrayImage, out: &mut Features) {
         out.key_points.clear();
