@@ -202,7 +202,7 @@ impl<'m> Lowering<'m> {
         let kind = match (kernel, stride, groups) {
             (1, 1, 1) if depth == channels => Kind::Pointwise,
             (3, 2, 1) if depth == channels && channels == 3 => Kind::Dense,
-            (3 | 5 | 7, 1 | 2, groups) if depth == 1 && groups == channels as i64 && filters == channels => {
+            (3 | 5, 1 | 2, groups) if depth == 1 && groups == channels as i64 && filters == channels => {
                 Kind::Depthwise { kernel, stride: stride as usize }
             }
             _ => {

@@ -5,11 +5,10 @@
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 
+use super::{WIDEST, load};
+
 /// Output channels computed together.
 pub(crate) const BLOCK: usize = 6;
-
-/// Widest vector in floats; rows are processed to the next multiple of it and must have that much room.
-pub(crate) const WIDEST: usize = 16;
 
 /// A weight matrix in the order in which the kernel reads it, padded with zero rows to a multiple of [`BLOCK`].
 #[derive(Debug)]
@@ -54,7 +53,7 @@ pub(crate) struct Rows<'a> {
     pub(crate) outputs: &'a [usize],
     /// Added to the product before ReLU, one per padded row, or empty.
     pub(crate) addend: &'a [usize],
-    /// Floats per row.
+    /// Floats per row; all are processed up to the next multiple of [`WIDEST`].
     pub(crate) length: usize,
 }
 
@@ -88,9 +87,10 @@ fn blocks<S: Simd, const V: usize>(simd: S, memory: &mut [f32], matrix: &Matrix,
     let blocks = matrix.weights.chunks_exact(matrix.depth).zip(&matrix.bias).zip(rows.outputs.as_chunks::<BLOCK>().0);
     for (block, ((weights, bias), outputs)) in blocks.enumerate() {
         let sums = product::<S, V>(simd, memory, weights, bias, rows.inputs, column);
-        for (row, (sums, output)) in sums.into_iter().zip(outputs).enumerate() {
-            for (vector, mut sum) in sums.into_iter().enumerate() {
+        for (row, (sums, output)) in sums.iter().zip(outputs).enumerate() {
+            for (vector, sum) in sums.iter().enumerate() {
                 let at = column + vector * S::f32s::LEN;
+                let mut sum = *sum;
                 if let Some(addend) = rows.addend.get(block * BLOCK + row) {
                     sum += load(simd, memory, addend + at);
                 }
@@ -100,6 +100,7 @@ fn blocks<S: Simd, const V: usize>(simd: S, memory: &mut [f32], matrix: &Matrix,
     }
 }
 
+/// Array methods that take closures are not always inlined here, and then they cost more than the product: hence the loops.
 #[inline(always)]
 fn product<S: Simd, const V: usize>(
     simd: S,
@@ -109,10 +110,16 @@ fn product<S: Simd, const V: usize>(
     inputs: &[usize],
     column: usize,
 ) -> [[S::f32s; V]; BLOCK] {
-    let mut sums: [[S::f32s; V]; BLOCK] = bias.map(|bias| [S::f32s::splat(simd, bias); V]);
+    let mut sums = [[S::f32s::splat(simd, 0.0); V]; BLOCK];
+    for (sums, bias) in sums.iter_mut().zip(bias) {
+        *sums = [S::f32s::splat(simd, *bias); V];
+    }
     for (weights, input) in weights.iter().zip(inputs) {
         let row = &memory[input + column..][..V * S::f32s::LEN];
-        let values: [S::f32s; V] = std::array::from_fn(|vector| load(simd, row, vector * S::f32s::LEN));
+        let mut values = [sums[0][0]; V];
+        for (value, row) in values.iter_mut().zip(row.chunks_exact(S::f32s::LEN)) {
+            *value = S::f32s::from_slice(simd, row);
+        }
         for (sums, weight) in sums.iter_mut().zip(weights) {
             let weight = S::f32s::splat(simd, *weight);
             for (sum, value) in sums.iter_mut().zip(values) {
@@ -121,10 +128,4 @@ fn product<S: Simd, const V: usize>(
         }
     }
     sums
-}
-
-/// One vector from `memory` at `offset`.
-#[inline(always)]
-pub(crate) fn load<S: Simd>(simd: S, memory: &[f32], offset: usize) -> S::f32s {
-    S::f32s::from_slice(simd, &memory[offset..][..S::f32s::LEN])
 }

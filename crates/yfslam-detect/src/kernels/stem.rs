@@ -5,7 +5,8 @@
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use super::matmul::{Matrix, Rows, WIDEST, load, multiply_simd};
+use super::matmul::{Matrix, Rows, multiply_simd};
+use super::{WIDEST, load};
 
 /// Offsets that follow from the input size and the number of channels; fixed when the model is loaded.
 #[derive(Debug)]
@@ -19,8 +20,8 @@ pub(crate) struct Geometry {
     products: [Vec<usize>; 3],
     /// Where the product writes for each of the three states of its ring, relative to the scratch.
     results: [Vec<usize>; 3],
-    /// Start of the line that holds the maximum over three rows, relative to the scratch.
-    line: usize,
+    /// Floats of scratch memory.
+    pub(crate) scratch: usize,
 }
 
 impl Geometry {
@@ -46,17 +47,12 @@ impl Geometry {
             room,
             products: [0, 1, 2].map(product),
             results: [0, 1, 2].map(result),
-            line: inputs + filters * 3 * room + WIDEST,
+            scratch: inputs + filters * 3 * room,
         }
     }
 
     fn part(&self, channel: usize, row: usize, odd: usize) -> usize {
         part_offset(self.room, channel, row, odd)
-    }
-
-    /// Floats of scratch memory.
-    pub(crate) fn scratch(&self) -> usize {
-        self.line + self.width.next_multiple_of(WIDEST) + 2 * WIDEST
     }
 }
 
@@ -65,33 +61,39 @@ fn part_offset(room: usize, channel: usize, row: usize, odd: usize) -> usize {
     ((channel * 3 + row % 3) * 2 + odd) * room + WIDEST
 }
 
-/// Where the stem reads and writes, offsets into memory.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Planes<'a> {
-    pub(crate) inputs: &'a [usize],
-    pub(crate) outputs: &'a [usize],
-    pub(crate) scratch: usize,
-}
-
-/// Convolves and pools.
-pub(crate) fn stem(level: Level, memory: &mut [f32], geometry: &Geometry, matrix: &Matrix, planes: Planes) {
-    dispatch!(level, simd => stem_simd(simd, memory, geometry, matrix, planes));
+/// Convolves and pools planes of `memory`: from `inputs` to `outputs`.
+pub(crate) fn stem(
+    level: Level,
+    memory: &mut [f32],
+    scratch: &mut [f32],
+    geometry: &Geometry,
+    matrix: &Matrix,
+    (inputs, outputs): (&[usize], &[usize]),
+) {
+    dispatch!(level, simd => stem_simd(simd, memory, scratch, geometry, matrix, (inputs, outputs)));
 }
 
 #[inline(always)]
-fn stem_simd<S: Simd>(simd: S, memory: &mut [f32], geometry: &Geometry, matrix: &Matrix, planes: Planes) {
+fn stem_simd<S: Simd>(
+    simd: S,
+    memory: &mut [f32],
+    scratch: &mut [f32],
+    geometry: &Geometry,
+    matrix: &Matrix,
+    (inputs, outputs): (&[usize], &[usize]),
+) {
     simd.vectorize(
         #[inline(always)]
         || {
-            memory[planes.scratch..][..geometry.scratch()].fill(0.0);
+            scratch[..geometry.scratch].fill(0.0);
             for y in 0..geometry.height {
-                part_columns(simd, memory, geometry, planes, 2 * y);
-                part_columns(simd, memory, geometry, planes, 2 * y + 1);
-                let (inputs, outputs) = (&geometry.products[2 * y % 3], &geometry.results[y % 3]);
-                let rows = Rows { inputs, outputs, addend: &[], length: geometry.width };
-                multiply_simd(simd, &mut memory[planes.scratch..], matrix, rows);
+                part_columns(simd, memory, scratch, geometry, inputs, 2 * y);
+                part_columns(simd, memory, scratch, geometry, inputs, 2 * y + 1);
+                let (inputs, results) = (&geometry.products[2 * y % 3], &geometry.results[y % 3]);
+                let rows = Rows { inputs, outputs: results, addend: &[], length: geometry.width };
+                multiply_simd(simd, scratch, matrix, rows);
                 if y % 2 == 1 {
-                    pool(simd, memory, geometry, planes, y / 2);
+                    pool(simd, memory, scratch, geometry, outputs, y / 2);
                 }
             }
         },
@@ -100,36 +102,45 @@ fn stem_simd<S: Simd>(simd: S, memory: &mut [f32], geometry: &Geometry, matrix: 
 
 /// Copies row `y` of the input into its ring, even columns and odd columns apart.
 #[inline(always)]
-fn part_columns<S: Simd>(simd: S, memory: &mut [f32], geometry: &Geometry, planes: Planes, y: usize) {
-    for (channel, input) in planes.inputs.iter().enumerate() {
-        let [even, odd] = [0, 1].map(|odd| planes.scratch + geometry.part(channel, y, odd));
+fn part_columns<S: Simd>(
+    simd: S,
+    memory: &[f32],
+    scratch: &mut [f32],
+    geometry: &Geometry,
+    inputs: &[usize],
+    y: usize,
+) {
+    for (channel, input) in inputs.iter().enumerate() {
+        let (even, odd) = (geometry.part(channel, y, 0), geometry.part(channel, y, 1));
         for x in (0..geometry.width).step_by(S::f32s::LEN) {
             let from = input + 2 * (y * geometry.width + x);
             let (low, high) = (load(simd, memory, from), load(simd, memory, from + S::f32s::LEN));
-            low.unzip_low(high).store_slice(&mut memory[even + x..][..S::f32s::LEN]);
-            low.unzip_high(high).store_slice(&mut memory[odd + x..][..S::f32s::LEN]);
+            low.unzip_low(high).store_slice(&mut scratch[even + x..][..S::f32s::LEN]);
+            low.unzip_high(high).store_slice(&mut scratch[odd + x..][..S::f32s::LEN]);
         }
     }
 }
 
-/// Row `y` of the result: the maximum over the three rows of the ring, then over three columns, of which every other remains.
+/// Row `y` of the result: of the three rows of the ring, the maximum over each window of three columns around an even one.
 /// Padding is 0, the least value after ReLU.
 #[inline(always)]
-fn pool<S: Simd>(simd: S, memory: &mut [f32], geometry: &Geometry, planes: Planes, y: usize) {
-    let line = planes.scratch + geometry.line;
-    for (filter, output) in planes.outputs.iter().enumerate() {
-        let rows = [0, 1, 2].map(|state: usize| planes.scratch + geometry.results[state][filter]);
-        for x in (0..geometry.width).step_by(S::f32s::LEN) {
-            let [a, b, c] = rows.map(|row| load(simd, memory, row + x));
-            a.max(b).max(c).store_slice(&mut memory[line + x..][..S::f32s::LEN]);
-        }
-        for x in (0..geometry.width / 2).step_by(S::f32s::LEN) {
-            let triple = |at: usize| {
-                let [left, centre, right] = [at - 1, at, at + 1].map(|at| load(simd, memory, at));
-                left.max(centre).max(right)
-            };
-            let maxima = triple(line + 2 * x).unzip_low(triple(line + 2 * x + S::f32s::LEN));
-            maxima.store_slice(&mut memory[output + y * (geometry.width / 2) + x..][..S::f32s::LEN]);
+fn pool<S: Simd>(simd: S, memory: &mut [f32], scratch: &[f32], geometry: &Geometry, outputs: &[usize], y: usize) {
+    let width = geometry.width / 2;
+    let [first, second, third] = &geometry.results;
+    for (filter, output) in outputs.iter().enumerate() {
+        let rows = [first[filter], second[filter], third[filter]];
+        for x in (0..width).step_by(S::f32s::LEN) {
+            let (low, high) = (highest(simd, scratch, rows, 2 * x), highest(simd, scratch, rows, 2 * x + S::f32s::LEN));
+            let left = highest(simd, scratch, rows, 2 * x - 1);
+            let left = left.unzip_low(highest(simd, scratch, rows, 2 * x + S::f32s::LEN - 1));
+            let maxima = low.unzip_low(high).max(low.unzip_high(high)).max(left);
+            maxima.store_slice(&mut memory[output + y * width + x..][..S::f32s::LEN]);
         }
     }
+}
+
+/// The maximum over three rows.
+#[inline(always)]
+fn highest<S: Simd>(simd: S, scratch: &[f32], [a, b, c]: [usize; 3], at: usize) -> S::f32s {
+    load(simd, scratch, a + at).max(load(simd, scratch, b + at)).max(load(simd, scratch, c + at))
 }

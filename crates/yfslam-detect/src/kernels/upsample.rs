@@ -2,7 +2,7 @@
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use super::matmul::load;
+use super::load;
 
 /// Writes each input plane of `height × width` twice as large; offsets into memory.
 pub(crate) fn double(level: Level, memory: &mut [f32], size: (usize, usize), inputs: &[usize], outputs: &[usize]) {
