@@ -103,7 +103,8 @@ impl Plan {
                     stem::stem(level, memory, scratch, geometry, matrix, (inputs, outputs));
                 }
                 Operation::Pointwise { matrix, addend, length } => {
-                    matmul::multiply(level, memory, matrix, Rows { inputs, outputs, addend, length: *length });
+                    let rows = Rows { inputs, outputs, addend, keep_larger: false, length: *length };
+                    matmul::multiply(level, memory, matrix, rows);
                 }
                 Operation::Depthwise { geometry, weights, bias, relu } => {
                     let planes = depthwise::Planes { inputs, outputs, weights, bias, relu: *relu };

@@ -53,11 +53,13 @@ pub(crate) struct Rows<'a> {
     pub(crate) outputs: &'a [usize],
     /// Added to the product before ReLU, one per padded row, or empty.
     pub(crate) addend: &'a [usize],
+    /// Whether a result that is less than what its place holds is dropped.
+    pub(crate) keep_larger: bool,
     /// Floats per row; all are processed up to the next multiple of [`WIDEST`].
     pub(crate) length: usize,
 }
 
-/// `outputs = relu(weights · inputs + bias + addend)`.
+/// `outputs = relu(weights · inputs + bias + addend)`, or the larger of that and what `outputs` held.
 pub(crate) fn multiply(level: Level, memory: &mut [f32], matrix: &Matrix, rows: Rows) {
     dispatch!(level, simd => multiply_simd(simd, memory, matrix, rows));
 }
@@ -94,7 +96,11 @@ fn blocks<S: Simd, const V: usize>(simd: S, memory: &mut [f32], matrix: &Matrix,
                 if let Some(addend) = rows.addend.get(block * BLOCK + row) {
                     sum += load(simd, memory, addend + at);
                 }
-                sum.max(floor).store_slice(&mut memory[output + at..][..S::f32s::LEN]);
+                let place = &mut memory[output + at..][..S::f32s::LEN];
+                if rows.keep_larger {
+                    sum = sum.max(S::f32s::from_slice(simd, place));
+                }
+                sum.max(floor).store_slice(place);
             }
         }
     }

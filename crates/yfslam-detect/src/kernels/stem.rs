@@ -1,14 +1,15 @@
 //! The stem: convolution 3×3 stride 2, ReLU, max pool 3×3 stride 2, both with padding 1, row by row.
 //!
-//! Joined so that the large map in between (24 × 176 × 176) never leaves the first-level cache: only its last three rows exist.
-//! The convolution of one row is a matrix product over 3·3·channels rows of input, parted into even and odd columns.
+//! Joined so that the large map in between (24 × 176 × 176) never exists: of its rows only the maximum of those with which a
+//! window begins, and the one with which it ends and the next begins. The convolution of one row is a matrix product over
+//! 3·3·channels rows of input, parted into even and odd columns.
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use super::matmul::{Matrix, Rows, multiply_simd};
 use super::{WIDEST, load};
 
-/// Offsets that follow from the input size and the number of channels; fixed when the model is loaded.
+/// Offsets into the scratch memory that follow from the input size and the number of channels.
 #[derive(Debug)]
 pub(crate) struct Geometry {
     /// Size of the convolution's result, half of the input's.
@@ -16,10 +17,10 @@ pub(crate) struct Geometry {
     width: usize,
     /// Floats of one ring row with its margins.
     room: usize,
-    /// Rows of the product for each of the three states of the input ring, relative to the scratch.
+    /// Rows of the product for each of the three states of the input ring.
     products: [Vec<usize>; 3],
-    /// Where the product writes for each of the three states of its ring, relative to the scratch.
-    results: [Vec<usize>; 3],
+    /// Where the product writes: two places for each filter, which take turns.
+    results: [Vec<usize>; 2],
     /// Floats of scratch memory.
     pub(crate) scratch: usize,
 }
@@ -40,14 +41,14 @@ impl Geometry {
             };
             (0..channels * 9).map(tap).collect()
         };
-        let result = |state: usize| (0..filters).map(|filter| inputs + (filter * 3 + state) * room + WIDEST).collect();
+        let result = |state: usize| (0..filters).map(|filter| inputs + (filter * 2 + state) * room + WIDEST).collect();
         Self {
             height: height / 2,
             width,
             room,
             products: [0, 1, 2].map(product),
-            results: [0, 1, 2].map(result),
-            scratch: inputs + filters * 3 * room,
+            results: [0, 1].map(result),
+            scratch: inputs + filters * 2 * room,
         }
     }
 
@@ -89,11 +90,21 @@ fn stem_simd<S: Simd>(
             for y in 0..geometry.height {
                 part_columns(simd, memory, scratch, geometry, inputs, 2 * y);
                 part_columns(simd, memory, scratch, geometry, inputs, 2 * y + 1);
-                let (inputs, results) = (&geometry.products[2 * y % 3], &geometry.results[y % 3]);
-                let rows = Rows { inputs, outputs: results, addend: &[], length: geometry.width };
+                // Windows are the rows 2k − 1, 2k, 2k + 1: an even row joins the odd one before it, an odd row starts afresh.
+                let [begun, fresh] = [y / 2 % 2, 1 - y / 2 % 2].map(|turn| &geometry.results[turn][..]);
+                let rows = Rows {
+                    inputs: &geometry.products[2 * y % 3],
+                    outputs: if y % 2 == 0 { begun } else { fresh },
+                    addend: &[],
+                    keep_larger: y % 2 == 0,
+                    length: geometry.width,
+                };
                 multiply_simd(simd, scratch, matrix, rows);
                 if y % 2 == 1 {
-                    pool(simd, memory, scratch, geometry, outputs, y / 2);
+                    for (filter, output) in outputs.iter().enumerate() {
+                        let row = &mut memory[output + y / 2 * (geometry.width / 2)..];
+                        pool(simd, scratch, [begun[filter], fresh[filter]], geometry.width, row);
+                    }
                 }
             }
         },
@@ -110,37 +121,38 @@ fn part_columns<S: Simd>(
     inputs: &[usize],
     y: usize,
 ) {
+    let length = geometry.width.next_multiple_of(S::f32s::LEN);
     for (channel, input) in inputs.iter().enumerate() {
-        let (even, odd) = (geometry.part(channel, y, 0), geometry.part(channel, y, 1));
-        for x in (0..geometry.width).step_by(S::f32s::LEN) {
-            let from = input + 2 * (y * geometry.width + x);
-            let (low, high) = (load(simd, memory, from), load(simd, memory, from + S::f32s::LEN));
-            low.unzip_low(high).store_slice(&mut scratch[even + x..][..S::f32s::LEN]);
-            low.unzip_high(high).store_slice(&mut scratch[odd + x..][..S::f32s::LEN]);
+        let row = &memory[input + 2 * y * geometry.width..][..2 * length];
+        let parts = &mut scratch[geometry.part(channel, y, 0)..][..geometry.room + length];
+        let (even, odd) = parts.split_at_mut(geometry.room);
+        let parts = even.chunks_exact_mut(S::f32s::LEN).zip(odd.chunks_exact_mut(S::f32s::LEN));
+        for (row, (even, odd)) in row.chunks_exact(2 * S::f32s::LEN).zip(parts) {
+            let (low, high) = (load(simd, row, 0), load(simd, row, S::f32s::LEN));
+            low.unzip_low(high).store_slice(even);
+            low.unzip_high(high).store_slice(odd);
         }
     }
 }
 
-/// Row `y` of the result: of the three rows of the ring, the maximum over each window of three columns around an even one.
-/// Padding is 0, the least value after ReLU.
+/// Of two rows of `width`, the maximum over each window of three columns around an even one. Padding is 0, the least value after
+/// ReLU.
 #[inline(always)]
-fn pool<S: Simd>(simd: S, memory: &mut [f32], scratch: &[f32], geometry: &Geometry, outputs: &[usize], y: usize) {
-    let width = geometry.width / 2;
-    let [first, second, third] = &geometry.results;
-    for (filter, output) in outputs.iter().enumerate() {
-        let rows = [first[filter], second[filter], third[filter]];
-        for x in (0..width).step_by(S::f32s::LEN) {
-            let (low, high) = (highest(simd, scratch, rows, 2 * x), highest(simd, scratch, rows, 2 * x + S::f32s::LEN));
-            let left = highest(simd, scratch, rows, 2 * x - 1);
-            let left = left.unzip_low(highest(simd, scratch, rows, 2 * x + S::f32s::LEN - 1));
-            let maxima = low.unzip_low(high).max(low.unzip_high(high)).max(left);
-            maxima.store_slice(&mut memory[output + y * width + x..][..S::f32s::LEN]);
-        }
+fn pool<S: Simd>(simd: S, scratch: &[f32], rows: [usize; 2], width: usize, pooled: &mut [f32]) {
+    let length = (width / 2).next_multiple_of(S::f32s::LEN);
+    let line = |start: usize| scratch[start..][..2 * length].chunks_exact(2 * S::f32s::LEN);
+    let (centre, left) = (line(rows[0]).zip(line(rows[1])), line(rows[0] - 1).zip(line(rows[1] - 1)));
+    for ((centre, left), pooled) in centre.zip(left).zip(pooled[..length].chunks_exact_mut(S::f32s::LEN)) {
+        let (even, odd) = larger(simd, centre);
+        let (before, _) = larger(simd, left);
+        even.max(odd).max(before).store_slice(pooled);
     }
 }
 
-/// The maximum over three rows.
+/// The elementwise maximum of two slices of two vectors; even elements, odd elements.
 #[inline(always)]
-fn highest<S: Simd>(simd: S, scratch: &[f32], [a, b, c]: [usize; 3], at: usize) -> S::f32s {
-    load(simd, scratch, a + at).max(load(simd, scratch, b + at)).max(load(simd, scratch, c + at))
+fn larger<S: Simd>(simd: S, (a, b): (&[f32], &[f32])) -> (S::f32s, S::f32s) {
+    let low = load(simd, a, 0).max(load(simd, b, 0));
+    let high = load(simd, a, S::f32s::LEN).max(load(simd, b, S::f32s::LEN));
+    (low.unzip_low(high), low.unzip_high(high))
 }
