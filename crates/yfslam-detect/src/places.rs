@@ -73,7 +73,7 @@ impl<'n> Places<'n> {
 
 /// Floats from one plane to the next: room for vectors that reach past the last row and for rows written in blocks, and an odd
 /// number of cache lines, so that equal positions of neighbouring planes fall into different sets of the cache.
-fn stride((height, width): (usize, usize)) -> usize {
+pub(crate) fn stride((height, width): (usize, usize)) -> usize {
     let whole = (height * width).next_multiple_of(WIDEST);
     let rows = (height.max(ROWS) - 1) * width + width.next_multiple_of(WIDEST);
     (whole.max(rows).div_ceil(WIDEST) | 1) * WIDEST

@@ -181,3 +181,48 @@ fn correlate<S: Simd, const K: usize, const STRIDE: usize, const SPAN: usize>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kernels::testing::{Arena, assert_close, levels, noise};
+
+    proptest! {
+        #[test]
+        fn equals_the_convolution_as_defined(
+            (height, width) in (1..40_usize, 1..60_usize),
+            (kernel, stride) in (prop_oneof![Just(3_usize), Just(5)], 1..3_usize),
+            relu in any::<bool>(),
+            seed in any::<u32>(),
+        ) {
+            let geometry = Geometry::new((height, width), kernel, stride);
+            let (weights, bias) = (noise(2 * kernel * kernel, seed), noise(2, seed ^ 1));
+            let out = (height.div_ceil(stride), width.div_ceil(stride));
+            for level in levels() {
+                let (mut arena, offsets) = Arena::new(&[(2, (height, width)), (2, out), (1, (9, 9))], seed);
+                let (inputs, outputs) = (&offsets[0], &offsets[1]);
+                let before = arena.memory.clone();
+                let planes = Planes { inputs, outputs, weights: &weights, bias: &bias, relu };
+                let mut scratch = noise(geometry.scratch(), seed);
+                convolve(level, &mut arena.memory, &mut scratch, &geometry, planes);
+                arena.assert_untouched(&before, outputs);
+                for plane in 0..2 {
+                    let expected: Vec<f64> = (0..out.0 * out.1).map(|index| {
+                        let (y, x) = (index / out.1 * stride, index % out.1 * stride);
+                        let tap = |tap: usize| {
+                            let (dx, dy) = (tap / kernel, tap % kernel);
+                            let (y, x) = ((y + dy).wrapping_sub(kernel / 2), (x + dx).wrapping_sub(kernel / 2));
+                            let weight = f64::from(weights[plane * kernel * kernel + tap]);
+                            if y < height && x < width { weight * f64::from(before[inputs[plane] + y * width + x]) } else { 0.0 }
+                        };
+                        let sum = (0..kernel * kernel).map(tap).sum::<f64>() + f64::from(bias[plane]);
+                        if relu { sum.max(0.0) } else { sum }
+                    }).collect();
+                    assert_close(arena.plane(outputs[plane]), &expected, &format!("{level:?}"));
+                }
+            }
+        }
+    }
+}

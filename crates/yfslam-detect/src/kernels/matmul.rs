@@ -135,3 +135,43 @@ fn product<S: Simd, const V: usize>(
     }
     sums
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kernels::testing::{Arena, assert_close, levels, noise};
+
+    proptest! {
+        #[test]
+        fn equals_the_sum_of_products(
+            (count, depth, length) in (1..30_usize, 1..40_usize, 1..150_usize),
+            (relu, adds, keep_larger) in any::<(bool, bool, bool)>(),
+            seed in any::<u32>(),
+        ) {
+            let (weights, bias) = (noise(count * depth, seed), noise(count, seed ^ 1));
+            let matrix = Matrix::pack(&weights, &bias, relu);
+            let padded = matrix.padded_rows();
+            let size = (1, length);
+            for level in levels() {
+                let (mut arena, offsets) = Arena::new(&[(depth, size), (padded, size), (padded, size)], seed);
+                let [inputs, addend, outputs] = &offsets[..] else { unreachable!() };
+                let before = arena.memory.clone();
+                let addend = if adds { &addend[..] } else { &[] };
+                multiply(level, &mut arena.memory, &matrix, Rows { inputs, outputs, addend, keep_larger, length });
+                arena.assert_untouched(&before, outputs);
+                for row in 0..count {
+                    let expected: Vec<f64> = (0..length).map(|column| {
+                        let product = |k: usize| f64::from(weights[row * depth + k]) * f64::from(before[inputs[k] + column]);
+                        let added = if adds { f64::from(before[addend[row] + column]) } else { 0.0 };
+                        let sum = (0..depth).map(product).sum::<f64>() + f64::from(bias[row]) + added;
+                        let least = if keep_larger { f64::from(before[outputs[row] + column]) } else { f64::NEG_INFINITY };
+                        sum.max(least).max(if relu { 0.0 } else { f64::NEG_INFINITY })
+                    }).collect();
+                    assert_close(arena.plane(outputs[row]), &expected, &format!("{level:?}"));
+                }
+            }
+        }
+    }
+}

@@ -156,3 +156,49 @@ fn larger<S: Simd>(simd: S, (a, b): (&[f32], &[f32])) -> (S::f32s, S::f32s) {
     let high = load(simd, a, S::f32s::LEN).max(load(simd, b, S::f32s::LEN));
     (low.unzip_low(high), low.unzip_high(high))
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kernels::testing::{Arena, assert_close, levels, noise};
+
+    proptest! {
+        #[test]
+        fn equals_convolution_then_pool(
+            (height, width) in (1..12_usize, 1..30_usize).prop_map(|(height, width)| (4 * height, 4 * width)),
+            filters in 1..14_usize,
+            seed in any::<u32>(),
+        ) {
+            let (weights, bias) = (noise(filters * 27, seed), noise(filters, seed ^ 1));
+            let matrix = Matrix::pack(&weights, &bias, true);
+            let geometry = Geometry::new((height, width), 3, matrix.padded_rows());
+            for level in levels() {
+                let pooled = (height / 4, width / 4);
+                let (mut arena, offsets) = Arena::new(&[(3, (height, width)), (filters, pooled), (1, (9, 9))], seed);
+                let (inputs, outputs) = (&offsets[0], &offsets[1]);
+                let before = arena.memory.clone();
+                let mut scratch = noise(geometry.scratch, seed);
+                stem(level, &mut arena.memory, &mut scratch, &geometry, &matrix, (inputs, outputs));
+                arena.assert_untouched(&before, outputs);
+                let convolved = |filter: usize, y: usize, x: usize| {
+                    let tap = |tap: usize| {
+                        let (y, x) = ((2 * y + tap / 3 % 3).wrapping_sub(1), (2 * x + tap % 3).wrapping_sub(1));
+                        let value = if y < height && x < width { before[inputs[tap / 9] + y * width + x] } else { 0.0 };
+                        f64::from(weights[filter * 27 + tap]) * f64::from(value)
+                    };
+                    ((0..27).map(tap).sum::<f64>() + f64::from(bias[filter])).max(0.0)
+                };
+                for (filter, output) in outputs.iter().enumerate() {
+                    let expected: Vec<f64> = (0..pooled.0 * pooled.1).map(|index| {
+                        let (y, x) = (2 * (index / pooled.1), 2 * (index % pooled.1));
+                        let inside = |tap: usize| Some(((y + tap / 3).checked_sub(1)?, (x + tap % 3).checked_sub(1)?));
+                        (0..9).filter_map(inside).map(|(y, x)| convolved(filter, y, x)).fold(0.0, f64::max)
+                    }).collect();
+                    assert_close(arena.plane(*output), &expected, &format!("{level:?}"));
+                }
+            }
+        }
+    }
+}
