@@ -134,7 +134,7 @@ pub struct LightConfig {
 
 impl Default for LightConfig {
     fn default() -> Self {
-        Self { shadow_rays: 12, moving_shadows: true, exposure: 1.0 }
+        Self { shadow_rays: 8, moving_shadows: true, exposure: 1.0 }
     }
 }
 

@@ -11,7 +11,7 @@ use yfslam::{BoundingBox, Camera, Detection, RgbdFrame};
 
 use crate::camera_path::CameraPath;
 use crate::config::{WorldConfig, WorldError};
-use crate::light::{LightMap, Occluder};
+use crate::light::{LightMap, Lights, Occluder};
 use crate::people::People;
 use crate::render::rays::RayTable;
 use crate::render::shade::View;
@@ -60,7 +60,7 @@ impl World {
         let people = People::new(&mut scene, config.activity, config.people, config.seed);
         let textures = scene.palette.paint();
         let lights = scene.lights.clone();
-        let light_maps = lights.bake(&mut scene.mesh, config.light.shadow_rays, config.seed);
+        let light_maps = lights.bake(&mut scene.mesh, config.light.shadow_rays);
         let path = CameraPath::new(config.motion, scene.camera, config.hand_shake, config.seed);
         let rays = RayTable::new(&config.camera);
         let config = config.clone();
@@ -197,7 +197,7 @@ impl World {
         let count = FRAMES.min(self.len());
         let shares = (0..count).map(|k| {
             let index = k * self.len() / count;
-            let (people, _) = self.people.at(self.seconds(index), &self.scene.lights);
+            let (people, _) = self.people.at(self.seconds(index), &Lights::default());
             let t_cam_world = self.pose(index).inverse();
             let view = View {
                 meshes: [&self.scene.mesh, &people],

@@ -16,7 +16,7 @@ use crate::rng::{Rng, hash};
 use crate::scene::{Scene, Seat};
 use body::Body;
 use skeleton::{Bone, BonePoses};
-use walkway::Walkway;
+use walkway::{Stop, Walkway};
 
 /// What one person does.
 #[derive(Clone, Debug)]
@@ -127,18 +127,19 @@ impl Person {
     }
 }
 
-/// The round of walker `k` of `count`: an oval around the furniture, wider for every second one.
+/// The round of walker `k` of `count`: an oval around the furniture in one of two lanes, walked in opposite directions.
+/// The closer, the longer one lingers in front of the camera, too.
 fn walk_plan(scene: &Scene, k: usize, count: usize, seed: u64, closeness: f64) -> Walkway {
-    let mut rng = Rng::new(seed, 0x3a1c + k as u64);
+    const LANE_M: f64 = 0.5;
     let lane = k % 2;
-    let inward = 0.38 * lane as f64;
+    let inward = LANE_M * lane as f64;
     let [closest, farthest] = scene.walk_near_y;
     let near = farthest + (closest - farthest) * closeness + inward;
-    let far = scene.walk_far_y - 0.6 * inward;
-    let half = scene.walk_half_width - 0.5 * inward;
+    let (far, half) = (scene.walk_far_y - inward, scene.walk_half_width - 0.9 * inward);
     let (cx, cy) = (scene.walk_center.x, (near + far) / 2.0);
-    let mut jitter = |v: f64| v + rng.range64(-0.06, 0.06);
-    // A rounded rectangle: eight points, anticlockwise from the right.
+    let mut own = Rng::new(seed, 0x3a1c + k as u64);
+    let mut jitter = |v: f64| v + own.range64(-0.05, 0.05);
+    // A rounded rectangle, anticlockwise from the right.
     let waypoints = [
         [half, cy],
         [0.92 * half, far - 0.35],
@@ -146,16 +147,23 @@ fn walk_plan(scene: &Scene, k: usize, count: usize, seed: u64, closeness: f64) -
         [-0.35 * half, far],
         [-0.92 * half, far - 0.35],
         [-half, cy],
-        [-0.86 * half, near + 0.35],
+        [-0.80 * half, near + 0.30],
         [-0.30 * half, near],
         [0.30 * half, near],
-        [0.86 * half, near + 0.35],
+        [0.80 * half, near + 0.30],
     ]
     .map(|[x, y]| [jitter(cx + x), jitter(y)]);
     // People of one lane share its schedule at different phases, and so never meet.
-    let mut schedule = Rng::new(seed, 0x5c4e + lane as u64);
-    let speed = schedule.range64(0.75, 1.0);
+    let mut draw = Rng::new(seed, 0x5c4e + lane as u64);
+    let speed = draw.range64(0.75, 1.0);
     let in_lane = (count + 1 - lane) / 2;
-    let phase = schedule.range64(0.0, 1.0) + (k / 2) as f64 / in_lane.max(1) as f64;
-    Walkway::new(&waypoints, speed, phase, lane == 0, &mut schedule)
+    let phase = draw.range64(0.0, 1.0) + (k / 2) as f64 / in_lane.max(1) as f64;
+    let mut stop = |x: f64, y: f64, linger: f64| Stop {
+        near: [cx + x + draw.range64(-0.2, 0.2), y],
+        pause: draw.range64(0.7, 1.4) + linger * draw.range64(0.8, 1.2),
+        glance: draw.range64(-1.2, 1.2),
+    };
+    let linger = 4.5 * closeness;
+    let stops = [stop(-0.35, near, linger), stop(0.35, near, linger), stop(0.0, far, 0.0)];
+    Walkway::new(&waypoints, &stops, speed, phase, lane == 0)
 }

@@ -86,6 +86,11 @@ fn draw_tile(
         for row in 0..TILE {
             let local = row * across + column;
             let global = band * TILE * across + local;
+            if ys[global][0].min(ys[global][TILE - 1]) - rays.pitch[1] > t.bounds.y[1]
+                || ys[global][0].max(ys[global][TILE - 1]) + rays.pitch[1] < t.bounds.y[0]
+            {
+                continue;
+            }
             draw_row(t, id, &xs[global], &ys[global], &mut depths[local], &mut ids[local]);
         }
     }
