@@ -83,7 +83,7 @@ impl Tailor<'_> {
     /// A loft on `bone`, moved by `at` and tilted by `pitch` about the bone's x axis.
     fn part(&mut self, bone: Bone, at: Vec3, pitch: f32, rings: &[[f32; 3]], patch: Patch) {
         let first = self.mesh.vertices.len();
-        self.mesh.loft(20, &smooth(rings), patch);
+        self.mesh.loft(16, rings, patch);
         let pose = Isometry3::new(at, Vec3::x() * pitch);
         self.mesh.transform_from(first, &pose);
         self.bones.resize(self.mesh.vertices.len(), bone.index() as u8);
@@ -113,7 +113,7 @@ impl Tailor<'_> {
             [-0.11, 0.184 * s * g, 0.136 * s * g],
             [-0.10, 0.12, 0.09],
         ];
-        self.part(Bone::Chest, Vec3::zeros(), 0.0, &trunk, patch);
+        self.part(Bone::Chest, Vec3::zeros(), 0.0, &smooth(&trunk), patch);
         let patch = self.patch(Material::Cloth(trousers), [1.1, 0.3], 500.0);
         let hips = [
             [0.06, 0.12, 0.08],
@@ -122,7 +122,7 @@ impl Tailor<'_> {
             [-0.10, 0.150 * s * g, 0.110 * s * g],
             [-0.15, 0.06, 0.06],
         ];
-        self.part(Bone::Pelvis, Vec3::zeros(), 0.0, &hips, patch);
+        self.part(Bone::Pelvis, Vec3::zeros(), 0.0, &smooth(&hips), patch);
         self.head(s, skin, hair);
         for side in [0, 1] {
             self.arm(p, side, s, sleeve, skin);
@@ -176,7 +176,7 @@ impl Tailor<'_> {
             [-0.97 * l, 0.056 * r, 0.058 * r],
             [-l, 0.030, 0.030],
         ];
-        self.part(Bone::Shank(side), Vec3::zeros(), 0.0, &calf, patch);
+        self.part(Bone::Shank(side), Vec3::zeros(), 0.0, &smooth(&calf), patch);
         let leather = self.rng.range(0.14, 0.5);
         let patch = self.patch(Material::Plain([leather, 0.9 * leather, 0.8 * leather]), [0.3, 0.28], 500.0);
         // The shoe's axis lies forward: the loft is tilted by a quarter turn.
@@ -191,7 +191,7 @@ impl Tailor<'_> {
             [-0.19 * s, 0.0, 0.0],
         ];
         let at = Vec3::new(0.0, 0.015, -a + 0.042);
-        self.part(Bone::Foot(side), at, std::f32::consts::FRAC_PI_2, &shoe, patch);
+        self.part(Bone::Foot(side), at, std::f32::consts::FRAC_PI_2, &smooth(&shoe), patch);
     }
 }
 

@@ -14,9 +14,11 @@ use rayon::prelude::*;
 
 use paint::Painter;
 use project::Projected;
-use raster::NOTHING;
+use raster::{NOTHING, Visibility};
 use rays::{RayTable, TILE};
 use shade::View;
+
+use crate::mesh::Mesh;
 
 /// What the renderer makes of one view; row-major, `width * height` pixels.
 #[derive(Clone, Debug)]
@@ -38,7 +40,8 @@ impl Picture {
 /// Renders the meshes of `view` from `t_cam_world`.
 pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antialias: bool) -> Picture {
     let triangles = project_all(rays, t_cam_world, view);
-    let seen = raster::rasterise(rays, &triangles);
+    let mut seen = Visibility::empty(rays);
+    seen.add(rays, &triangles);
     let painter = Painter { rays, view, triangles: &triangles, seen: &seen, antialias };
     let bands: Vec<Picture> = (0..rays.bands.len())
         .into_par_iter()
@@ -58,18 +61,6 @@ pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antial
     picture
 }
 
-/// Share of pixels that see an actor.
-pub fn actor_share(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View) -> f64 {
-    let triangles = project_all(rays, t_cam_world, view);
-    let seen = raster::rasterise(rays, &triangles);
-    let inside = (0..rays.height).flat_map(|row| (0..rays.width).map(move |column| row * rays.stride + column));
-    let covered = inside
-        .map(|index| seen.triangle[index])
-        .filter(|&id| id != NOTHING && view.instance(&triangles[id as usize]) != 0)
-        .count();
-    covered as f64 / (rays.width * rays.height) as f64
-}
-
 fn project_all(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View) -> Vec<Projected> {
     let frustum = rays.view();
     let mut triangles = Vec::new();
@@ -77,4 +68,34 @@ fn project_all(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View) -> Ve
         project::project(mesh, index, t_cam_world, &frustum, &mut triangles);
     }
     triangles
+}
+
+/// The static part of a view, kept to ask again and again how much of it people hide.
+#[derive(Clone, Debug)]
+pub struct Backdrop {
+    t_cam_world: Isometry3<f64>,
+    seen: Visibility,
+}
+
+impl Backdrop {
+    /// What the static mesh shows from `t_cam_world`.
+    pub fn new(rays: &RayTable, t_cam_world: Isometry3<f64>, mesh: &Mesh) -> Self {
+        let mut triangles = Vec::new();
+        project::project(mesh, 0, &t_cam_world, &rays.view(), &mut triangles);
+        let mut seen = Visibility::empty(rays);
+        seen.add(rays, &triangles);
+        seen.triangle.fill(NOTHING);
+        Self { t_cam_world, seen }
+    }
+
+    /// Share of pixels that `people` cover.
+    pub fn share(&self, rays: &RayTable, people: &Mesh) -> f64 {
+        let mut triangles = Vec::new();
+        project::project(people, 1, &self.t_cam_world, &rays.view(), &mut triangles);
+        let mut seen = self.seen.clone();
+        seen.add(rays, &triangles);
+        let rows = seen.triangle.chunks(rays.stride).take(rays.height);
+        let covered = rows.flat_map(|row| &row[..rays.width]).filter(|&&id| id != NOTHING).count();
+        covered as f64 / (rays.width * rays.height) as f64
+    }
 }

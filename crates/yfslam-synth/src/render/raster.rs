@@ -21,13 +21,17 @@ pub struct Visibility {
     pub triangle: Vec<u32>,
 }
 
-/// Finds the nearest triangle of every pixel.
-pub fn rasterise(rays: &RayTable, triangles: &[Projected]) -> Visibility {
-    let mut inverse_depth = vec![0.0; rays.x.len()];
-    let mut triangle = vec![NOTHING; rays.x.len()];
-    let band = TILE * rays.stride;
-    inverse_depth.par_chunks_mut(band).zip(triangle.par_chunks_mut(band)).enumerate().for_each(
-        |(index, (depths, ids))| {
+impl Visibility {
+    /// Nothing seen yet.
+    pub fn empty(rays: &RayTable) -> Self {
+        Self { inverse_depth: vec![0.0; rays.x.len()], triangle: vec![NOTHING; rays.x.len()] }
+    }
+
+    /// Puts `triangles` before or behind what is seen already, pixel by pixel.
+    pub fn add(&mut self, rays: &RayTable, triangles: &[Projected]) {
+        let band = TILE * rays.stride;
+        let bands = self.inverse_depth.par_chunks_mut(band).zip(self.triangle.par_chunks_mut(band));
+        bands.enumerate().for_each(|(index, (depths, ids))| {
             let in_band: Vec<u32> = (0u32..)
                 .zip(triangles)
                 .filter(|(_, t)| t.bounds.overlaps(&rays.bands[index]))
@@ -39,9 +43,8 @@ pub fn rasterise(rays: &RayTable, triangles: &[Projected]) -> Visibility {
                 candidates(tile, triangles, &in_band, &mut list);
                 draw_tile(rays, index, column, tile, triangles, &list, depths, ids);
             }
-        },
-    );
-    Visibility { inverse_depth, triangle }
+        });
+    }
 }
 
 /// A triangle that may touch the tile, and the greatest inverse depth it can have there.

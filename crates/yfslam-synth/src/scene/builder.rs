@@ -32,9 +32,10 @@ impl Palette {
         (self.orders.len() - 1) as u32
     }
 
-    /// Paints everything that was ordered.
-    pub fn paint(&self) -> Vec<Texture> {
-        self.orders.par_iter().map(|o| Texture::new(&o.material.paint(o.size_m, o.density, o.seed))).collect()
+    /// Paints everything that was ordered, with `sharpness` times the texels per metre.
+    pub fn paint(&self, sharpness: f32) -> Vec<Texture> {
+        let paint = |o: &Order| Texture::new(&o.material.paint(o.size_m, o.density * sharpness, o.seed));
+        self.orders.par_iter().map(paint).collect()
     }
 }
 
