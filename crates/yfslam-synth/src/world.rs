@@ -22,6 +22,9 @@ use crate::scene::Scene;
 use crate::sensor;
 use crate::texture::Texture;
 
+/// Names of the classes of [`SynthFrame`]'s detections, by [`Detection::class`].
+pub const CLASS_NAMES: [&str; 1] = ["person"];
+
 /// A synthetic sequence, ready to render.
 #[derive(Debug)]
 pub struct World {

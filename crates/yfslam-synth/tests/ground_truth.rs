@@ -243,3 +243,52 @@ fn timestamps_follow_the_frame_rate() {
     let times: Vec<i64> = (0..world.len()).map(|i| world.frame(i).frame.timestamp_ns).collect();
     assert_eq!(times, [0, 33_333_333, 66_666_667, 100_000_000]);
 }
+
+/// Whether nine neighbours in a row on the circle of radius 3 are all brighter or all darker by 20 (FAST-9).
+fn is_corner(grey: &dyn Fn(usize, usize) -> i32, x: usize, y: usize) -> bool {
+    const CIRCLE: [(i32, i32); 16] = [
+        (0, -3),
+        (1, -3),
+        (2, -2),
+        (3, -1),
+        (3, 0),
+        (3, 1),
+        (2, 2),
+        (1, 3),
+        (0, 3),
+        (-1, 3),
+        (-2, 2),
+        (-3, 1),
+        (-3, 0),
+        (-3, -1),
+        (-2, -2),
+        (-1, -3),
+    ];
+    let center = grey(x, y);
+    let differences = CIRCLE.map(|(dx, dy)| grey((x as i32 + dx) as usize, (y as i32 + dy) as usize) - center);
+    [1, -1].into_iter().any(|sign| (0..16).any(|start| (0..9).all(|k| sign * differences[(start + k) % 16] > 20)))
+}
+
+#[test]
+fn corners_abound_all_over_the_picture_at_several_scales() {
+    let mut config = config("walking_xyz?seed=16&people=0");
+    config.light.shadow_rays = 2;
+    config.sensor.color_noise = 1.5;
+    let world = World::new(&config).unwrap();
+    let image = world.frame(30).frame.color;
+    for shrink in [1, 2, 3] {
+        // Box-filtered to 1/shrink of the size.
+        let grey = |x: usize, y: usize| -> i32 {
+            let block =
+                (0..shrink * shrink).filter_map(|i| image.get(x * shrink + i % shrink, y * shrink + i / shrink));
+            block.map(|p| i32::from(p[1])).sum::<i32>() / (shrink * shrink) as i32
+        };
+        let (width, height) = (320 / shrink, 240 / shrink);
+        let mut cells = [false; 48];
+        for (x, y) in (3..height - 3).flat_map(|y| (3..width - 3).map(move |x| (x, y))) {
+            cells[(y * 6 / height) * 8 + x * 8 / width] |= is_corner(&grey, x, y);
+        }
+        let filled = cells.iter().filter(|&&filled| filled).count();
+        assert!(filled >= 38, "at 1/{shrink} of the size only {filled} of 48 cells have a corner");
+    }
+}

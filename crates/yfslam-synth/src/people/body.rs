@@ -124,8 +124,9 @@ impl Tailor<'_> {
         ];
         self.part(Bone::Pelvis, Vec3::zeros(), 0.0, &smooth(&hips), patch);
         self.head(s, skin, hair);
+        let bare = self.rng.chance(0.5);
         for side in [0, 1] {
-            self.arm(p, side, s, sleeve, skin);
+            self.arm(p, side, sleeve, bare, skin);
             self.leg(p, side, s, g, trousers);
         }
     }
@@ -149,10 +150,10 @@ impl Tailor<'_> {
         self.part(Bone::Head, Vec3::new(0.0, 0.108 * s, 0.118 * s), 0.0, &nose, patch);
     }
 
-    fn arm(&mut self, p: &Proportions, side: usize, s: f32, sleeve: Material, skin: [f32; 3]) {
+    fn arm(&mut self, p: &Proportions, side: usize, sleeve: Material, bare: bool, skin: [f32; 3]) {
+        let s = p.height / 1.75;
         let patch = self.patch(sleeve, [0.36, p.upper_arm() + 0.1], 500.0);
         self.part(Bone::UpperArm(side), Vec3::zeros(), 0.0, &limb(0.0, 0.062 * s, 0.051 * s, p.upper_arm()), patch);
-        let bare = self.rng.chance(0.5);
         let material = if bare { Material::Plain(skin) } else { sleeve };
         let patch = self.patch(material, [0.28, p.forearm() + 0.08], 500.0);
         self.part(Bone::Forearm(side), Vec3::zeros(), 0.0, &limb(0.0, 0.043 * s, 0.030 * s, p.forearm()), patch);

@@ -10,7 +10,6 @@ use crate::mesh::Vec3;
 
 /// Bones; sides are right, then left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
 pub enum Bone {
     Pelvis,
     Chest,

@@ -34,7 +34,7 @@ pub fn build(seed: u64) -> Scene {
     Scene {
         mesh: b.mesh,
         palette: b.palette,
-        lights: Lights { lamps, ambient: [[0.52, 0.52, 0.55], [0.38, 0.35, 0.32]] },
+        lights: Lights { lamps, ambient: [[0.66, 0.66, 0.69], [0.48, 0.45, 0.41]] },
         camera: look_at(Point3::new(0.0, -1.75, 1.36), Point3::new(0.0, 1.2, 0.86)),
         walk_center: Point3::new(0.0, 0.9, 0.0),
         walk_half_width: 2.3,
@@ -69,7 +69,7 @@ fn room(b: &mut Builder) -> Vec<Lamp> {
         center: corner(EAST - 0.03, 0.6, 1.6),
         half: [Vec3::y() * 0.9, Vec3::z() * 0.6],
         normal: -Vec3::x(),
-        radiance: [0.80, 0.90, 1.06],
+        radiance: [1.00, 1.12, 1.30],
     };
     b.density = 250.0;
     b.glowing(corner(EAST - 0.02, 1.5, 2.2), -Vec3::y() * 1.8, -Vec3::z() * 1.2, Material::Outdoors, 1.1);
@@ -84,7 +84,7 @@ fn room(b: &mut Builder) -> Vec<Lamp> {
         let center = corner(x, y, HEIGHT - 0.03);
         let top_left = center - half[0] - half[1];
         b.glowing(top_left, half[0] * 2.0, half[1] * 2.0, Material::Plain([1.0, 0.98, 0.94]), 1.3);
-        lamps.push(Lamp { center, half, normal: -Vec3::z(), radiance: [2.1, 2.04, 1.92] });
+        lamps.push(Lamp { center, half, normal: -Vec3::z(), radiance: [2.7, 2.62, 2.46] });
     }
     lamps
 }
