@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 use clap::Args;
-use yfslam_eval::{Delta, EvalError, EvalOptions, Evaluation, ExpectedFrames, RpeOptions, StampedPose, evaluate};
+use yfslam_eval::{Delta, EvalError, EvalOptions, Evaluation, StampedPose, evaluate};
 
 /// How stamps of estimate and ground truth are matched.
 #[derive(Args, Clone, Copy, Debug)]
@@ -27,26 +27,21 @@ impl MatchArgs {
     }
 }
 
-/// Evaluates an estimate with the absolute error and the drift per frame and per second; a drift over a span that the trajectory
-/// does not have is left out.
+/// Evaluates an estimate; a drift per second is left out where no two poses are a second apart.
 ///
 /// # Errors
 /// Estimate and truth do not belong together, or are too short or too straight to be aligned.
 pub fn judge(
     truth: &[StampedPose],
     estimate: &[StampedPose],
-    expected: ExpectedFrames,
-    max_diff_ns: u64,
+    mut options: EvalOptions,
 ) -> Result<Evaluation, EvalError> {
-    let spans = [RpeOptions::per_frame(), RpeOptions::per_second()];
-    let mut options = EvalOptions { max_diff_ns, rpe: spans.to_vec(), expected, ..Default::default() };
-    loop {
-        match evaluate(truth, estimate, &options) {
-            Err(EvalError::NoPairs { delta: Delta::Seconds(_), .. }) if options.rpe.len() > 1 => {
-                options.rpe.truncate(1);
-            }
-            result => return result,
+    match evaluate(truth, estimate, &options) {
+        Err(EvalError::NoPairs { delta: Delta::Seconds(_), .. }) => {
+            options.rpe.retain(|rpe| !matches!(rpe.delta, Delta::Seconds(_)));
+            evaluate(truth, estimate, &options)
         }
+        result => result,
     }
 }
 

@@ -36,8 +36,8 @@ pub struct LoadedDetector {
 /// # Errors
 /// The file cannot be read, is no ONNX model, or holds another network.
 pub fn load(file: &Path, config: &Config) -> Result<LoadedDetector> {
-    let bytes = std::fs::read(file)
-        .with_context(|| format!("cannot read the detector {}; check the path", file.display()))?;
+    let bytes =
+        std::fs::read(file).with_context(|| format!("cannot read the detector {}; check the path", file.display()))?;
     let score_threshold = config.dynamic.keep_score.min(config.dynamic.open_score);
     let detector_config = DetectorConfig { score_threshold, ..Default::default() };
     let network = YoloFastestV2::from_bytes(&file.display().to_string(), &bytes, &detector_config)?;

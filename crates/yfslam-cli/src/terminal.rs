@@ -31,9 +31,9 @@ impl Terminal {
         self.verbosity.quiet
     }
 
-    /// Whether progress can be drawn in place.
+    /// Whether progress can be drawn in place: log lines would tear it.
     pub fn draws(self) -> bool {
-        !self.is_quiet() && io::stderr().is_terminal()
+        !self.is_quiet() && self.verbosity.verbose == 0 && io::stderr().is_terminal()
     }
 
     /// A result that is not printed if the user wants silence.

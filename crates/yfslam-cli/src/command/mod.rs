@@ -20,7 +20,7 @@ pub fn run(cli: &Cli) -> Result<()> {
     let terminal = Terminal::new(cli.verbosity);
     match &cli.command {
         Command::Run(args) => run::run(args, terminal),
-        Command::Eval(args) => eval::run(args),
+        Command::Eval(args) => eval::run(args, terminal),
         Command::Demo(args) => demo::run(args, terminal),
         Command::Info(args) => info::run(args),
         Command::Config(args) => config::run(args),

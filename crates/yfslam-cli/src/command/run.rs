@@ -7,13 +7,15 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use yfslam::Config;
 use yfslam::dynamic::Method;
-use yfslam_eval::{Evaluation, ExpectedFrames, TableStyle};
+use yfslam_eval::{EvalOptions, Evaluation, ExpectedFrames, TableStyle};
 
 use crate::accuracy::{MatchArgs, judge, to_eval};
 use crate::detector::{self, LoadedDetector};
-use crate::output::{Association, BoxSource, MapSize, OutputFolder, Report, peak_memory_mb};
+use crate::output::OutputFolder;
+use crate::overlay::Overlay;
 use crate::pipeline::{Outcome, Pipeline};
 use crate::progress::Progress;
+use crate::report::{BoxSource, Report, Run};
 use crate::settings::SettingsArgs;
 use crate::source::{Source, SourceArgs, Truth};
 use crate::terminal::Terminal;
@@ -78,32 +80,26 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
     }
 
-    let pipeline = Pipeline::new(&config, &source.camera.camera, detector)?;
-    let outcome = drive(&mut source, pipeline, terminal)?.finish(&config)?;
+    let pictures = args.overlay.then(|| Overlay::prepare(out.path(), config.dynamic.open_score)).transpose()?;
+    let mut pipeline = Pipeline::new(&config, &source.camera.camera, detector)?;
+    drive(&mut source, &mut pipeline, pictures.as_ref(), terminal)?;
+    let outcome = pipeline.finish(&config)?;
 
     let evaluation = truth.as_ref().map(|truth| {
         let expected = ExpectedFrames::StampsNs(source.stamps_ns.clone());
-        judge(&truth.poses, &to_eval(&outcome.trajectory), expected, max_diff_ns)
+        let options = EvalOptions { max_diff_ns, expected, ..Default::default() };
+        judge(&truth.poses, &to_eval(&outcome.trajectory), options)
     });
     out.write(&outcome, &config)?;
-    let report = Report {
-        yfslam: env!("CARGO_PKG_VERSION"),
+    let report = Report::new(&Run {
         sequence: &args.source.sequence,
-        camera_origin: &source.camera.origin,
-        camera: &source.camera.camera,
+        source: &source,
         boxes,
-        frames: &outcome.frames,
-        association: source.association.as_ref().map(Association::from),
-        dynamic: &outcome.dynamic,
-        map: MapSize { keyframes: outcome.keyframes.len(), landmarks: outcome.landmarks.len() },
-        times: &outcome.stages,
-        wall_s: outcome.wall.as_secs_f64(),
-        fps: outcome.fps(),
-        peak_memory_mb: peak_memory_mb(),
-        groundtruth: truth.as_ref().map(|truth| truth.origin.as_str()),
+        outcome: &outcome,
+        truth: truth.as_ref(),
         evaluation: evaluation.as_ref().and_then(|e| e.as_ref().ok()),
         config: &config,
-    };
+    });
     out.write_report(&report)?;
     terminal.result(&summary(&report, &source, &outcome)?)?;
     let judged = show_accuracy(args, evaluation, terminal);
@@ -140,18 +136,23 @@ fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Opt
 }
 
 /// Takes all frames of the source through the pipeline.
-fn drive(source: &mut Source, mut pipeline: Pipeline, terminal: Terminal) -> Result<Pipeline> {
+fn drive(source: &mut Source, pipeline: &mut Pipeline, pictures: Option<&Overlay>, terminal: Terminal) -> Result<()> {
     let mut progress = Progress::new(terminal, &source.name, source.stamps_ns.len());
     let mut state = Default::default();
     while let Some(frame) = source.frames.next(&mut pipeline.stages) {
         match frame {
-            Ok(frame) => state = pipeline.track(&frame).state,
+            Ok(frame) => {
+                state = pipeline.track(&frame).state;
+                if let Some(pictures) = pictures {
+                    pictures.write(pipeline.frames().total() - 1, &frame, pipeline.slam())?;
+                }
+            }
             Err(skip) => pipeline.skip(skip),
         }
         progress.frame(pipeline.frames(), state);
     }
     progress.finish();
-    Ok(pipeline)
+    Ok(())
 }
 
 /// What became of the frames, in a few lines.
@@ -170,7 +171,12 @@ fn summary(report: &Report, source: &Source, outcome: &Outcome) -> Result<String
     if frames.skipped > 0 {
         let reasons: Vec<_> =
             frames.skipped_by_reason.iter().map(|(reason, count)| format!("{count} × {reason}")).collect();
-        writeln!(text, "skipped: {}; the first: {}", reasons.join(", "), frames.first_skipped.as_deref().unwrap_or("-"))?;
+        writeln!(
+            text,
+            "skipped: {}; the first: {}",
+            reasons.join(", "),
+            frames.first_skipped.as_deref().unwrap_or("-")
+        )?;
     }
     if let Some(a) = &report.association
         && a.duplicate_stamps_skipped + a.backward_stamps_skipped > 0
@@ -179,7 +185,11 @@ fn summary(report: &Report, source: &Source, outcome: &Outcome) -> Result<String
         writeln!(text, "list entries skipped: {duplicate} × duplicate stamp, {backward} × stamp runs backward")?;
     }
     if frames.detector_failures > 0 {
-        writeln!(text, "the detector failed on {} frames, which count as frames without boxes", frames.detector_failures)?;
+        writeln!(
+            text,
+            "the detector failed on {} frames, which count as frames without boxes",
+            frames.detector_failures
+        )?;
     }
     write!(text, "map: {} keyframes, {} landmarks", report.map.keyframes, report.map.landmarks)?;
     if let Some(peak) = report.peak_memory_mb {

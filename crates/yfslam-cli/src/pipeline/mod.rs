@@ -10,13 +10,15 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use yfslam::geometry::Pose;
+use yfslam::tracking::TrackingState;
 use yfslam::{Camera, Config, RgbdFrame, Slam, Tracked};
 use yfslam_io::StampedPose;
+use yfslam_io::time::format_stamp;
 use yfslam_io::write::PlyPoint;
 
 use crate::detector::LoadedDetector;
 use crate::source::Skip;
-pub use stages::{StageSummary, Stages};
+pub use stages::Stages;
 pub use tally::{DynamicTally, FrameTally};
 
 /// SLAM with a record of what happened.
@@ -29,6 +31,7 @@ pub struct Pipeline {
     live: Vec<StampedPose>,
     detector_times: Option<Receiver<Duration>>,
     started: Instant,
+    state: TrackingState,
     /// Most features, and most of them with depth, in a frame before the map began.
     best_start: (usize, usize),
 }
@@ -63,6 +66,7 @@ impl Pipeline {
             live: Vec::new(),
             detector_times: times,
             started: Instant::now(),
+            state: TrackingState::default(),
             best_start: (0, 0),
         })
     }
@@ -71,6 +75,7 @@ impl Pipeline {
     pub fn track(&mut self, frame: &RgbdFrame) -> Tracked {
         let started = Instant::now();
         let tracked = self.slam.track(frame);
+        self.log(&tracked);
         self.stages.push("frame", started.elapsed());
         self.note_times(&tracked);
         self.frames.count(tracked.state);
@@ -85,6 +90,7 @@ impl Pipeline {
 
     /// Counts a frame that cannot be used.
     pub fn skip(&mut self, skip: Skip) {
+        tracing::info!("skipped {}", skip.message);
         self.frames.skip(skip);
     }
 
@@ -96,6 +102,15 @@ impl Pipeline {
     /// What became of the frames so far.
     pub fn frames(&self) -> &FrameTally {
         &self.frames
+    }
+
+    fn log(&mut self, tracked: &Tracked) {
+        let (frame, time) = (self.frames.total(), format_stamp(tracked.timestamp_ns));
+        if tracked.state != self.state {
+            tracing::info!(frame, %time, before = ?self.state, now = ?tracked.state, "state");
+            self.state = tracked.state;
+        }
+        tracing::debug!(frame, %time, inliers = tracked.inliers, keyframe = tracked.is_keyframe, "frame");
     }
 
     fn note_times(&mut self, tracked: &Tracked) {
@@ -133,7 +148,8 @@ impl Pipeline {
         let map = self.slam.map();
         let mut keyframes: Vec<_> = map.keyframes().map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
         keyframes.sort_by_key(|&(sequence, ..)| sequence);
-        let landmark = |l: &yfslam::map::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
+        let landmark =
+            |l: &yfslam::map::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
         Ok(Outcome {
             trajectory: self.slam.trajectory().into_iter().map(stamped).collect(),
             live: self.live,

@@ -67,10 +67,7 @@ mod tests {
         }
         stages.push("alone", Duration::from_micros(1500));
         let found: Vec<_> = stages.summaries().collect();
-        assert_eq!(
-            found[0],
-            ("late", StageSummary { count: 100, median_ms: 50.0, p95_ms: 95.0, max_ms: 100.0 })
-        );
+        assert_eq!(found[0], ("late", StageSummary { count: 100, median_ms: 50.0, p95_ms: 95.0, max_ms: 100.0 }));
         assert_eq!(found[1], ("alone", StageSummary { count: 1, median_ms: 1.5, p95_ms: 1.5, max_ms: 1.5 }));
         assert_eq!(StageSummary::of(&[]), None);
     }

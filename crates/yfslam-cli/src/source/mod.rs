@@ -5,7 +5,7 @@
 mod folder;
 mod synth;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Result, bail};
 use clap::Args;
@@ -17,8 +17,11 @@ use yfslam_io::trajectory::mirror_trajectory;
 use yfslam_io::{CameraSource, FrameStream, TrajectoryFile};
 
 use crate::pipeline::Stages;
-pub use folder::open_sequence;
+pub use folder::{camera, open_sequence};
 pub use synth::Renderer;
+
+/// How far apart a colour and a depth image may be. Source: the tool of the TUM RGB-D benchmark.
+const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
 
 /// Which sequence, and how it is read.
 #[derive(Args, Clone, Debug)]
@@ -35,7 +38,7 @@ pub struct SourceArgs {
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     pub depth_factor: Option<f64>,
     /// How far apart a colour and a depth image may be, ms.
-    #[arg(long, value_name = "MS", default_value_t = 20.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", default_value_t = ASSOCIATION_TOLERANCE_MS, allow_negative_numbers = true)]
     pub association_tolerance: f64,
     /// First frame, counted from 0.
     #[arg(long, value_name = "I", default_value_t = 0)]
@@ -100,6 +103,19 @@ impl Frames {
 }
 
 impl SourceArgs {
+    /// All of a sequence, forward, with its own camera.
+    pub fn new(sequence: String) -> Self {
+        Self {
+            sequence,
+            camera: None,
+            depth_factor: None,
+            association_tolerance: ASSOCIATION_TOLERANCE_MS,
+            start: 0,
+            end: None,
+            reverse: false,
+        }
+    }
+
     /// Opens the sequence. A synthetic world brings its own boxes if `own_boxes` asks for them.
     ///
     /// # Errors
@@ -125,16 +141,28 @@ impl SourceArgs {
 }
 
 impl Source {
+    /// The exact truth that a synthetic world knows.
+    pub fn truth_of_world(&self) -> Option<Truth> {
+        match &self.frames {
+            Frames::Synth(renderer) => Some(renderer.truth()),
+            Frames::Folder(_) => None,
+        }
+    }
+
     /// The truth to judge an estimate by: a file, the folder's own `groundtruth.txt`, or the synthetic world's.
     ///
     /// # Errors
     /// The file cannot be read or holds values that are no pose.
     pub fn truth(&self, args: &SourceArgs, file: Option<&Path>) -> Result<Option<Truth>> {
-        if let (Frames::Synth(renderer), None) = (&self.frames, file) {
-            return Ok(Some(renderer.truth()));
-        }
         let beside = || Some(args.folder().join("groundtruth.txt")).filter(|path| path.is_file());
-        let Some(path) = file.map(PathBuf::from).or_else(beside) else { return Ok(None) };
+        let path = match (file, self.truth_of_world()) {
+            (None, Some(truth)) => return Ok(Some(truth)),
+            (Some(file), _) => file.to_owned(),
+            (None, None) => match beside() {
+                Some(path) => path,
+                None => return Ok(None),
+            },
+        };
         let mut poses = TrajectoryFile::read(&path)?.poses;
         if let Some(mirror) = self.mirror {
             poses = mirror_trajectory(&poses, mirror);
