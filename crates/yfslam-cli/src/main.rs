@@ -1,2 +1,35 @@
 //! The command `yfslam`.
-fn main() {}
+//!
+//! ```text
+//! arguments ─cli─► command/* ─► source (folder, synthetic world) ─► pipeline (Slam, what became of each frame) ─► output (files)
+//! ```
+
+mod accuracy;
+mod cli;
+mod command;
+mod detector;
+mod draw;
+mod output;
+mod overlay;
+mod pipeline;
+mod progress;
+mod report;
+mod settings;
+mod source;
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    let cli = cli::Cli::parse();
+    match command::run(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if terminal::is_closed_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            terminal::error(&error);
+            ExitCode::FAILURE
+        }
+    }
+}

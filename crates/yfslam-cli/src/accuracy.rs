@@ -1,0 +1,51 @@
+//! Estimates against the truth, with the options that `run`, `eval` and `demo` share.
+
+use anyhow::{Result, bail};
+use clap::Args;
+use yfslam_eval::{Delta, EvalError, EvalOptions, Evaluation, StampedPose, evaluate};
+
+/// How stamps of estimate and ground truth are matched.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct MatchArgs {
+    /// How far apart the stamps of an estimated and a true pose may be, ms. The tool of the TUM benchmark takes 20, `evo` 10; the
+    /// ground truth of Bonn needs 20.
+    #[arg(long, value_name = "MS", default_value_t = 20.0, allow_negative_numbers = true, help_heading = "Evaluation")]
+    pub max_difference_ms: f64,
+}
+
+impl MatchArgs {
+    /// The tolerance, ns.
+    ///
+    /// # Errors
+    /// A tolerance that is none.
+    pub fn max_diff_ns(self) -> Result<u64> {
+        let ms = self.max_difference_ms;
+        if !(0.0..=1e9).contains(&ms) {
+            bail!("--max-difference-ms is {ms}; give milliseconds, such as 20");
+        }
+        Ok((ms * 1e6) as u64)
+    }
+}
+
+/// Evaluates an estimate; a drift per second is left out where no two poses are a second apart.
+///
+/// # Errors
+/// Estimate and truth do not belong together, or are too short or too straight to be aligned.
+pub fn judge(
+    truth: &[StampedPose],
+    estimate: &[StampedPose],
+    mut options: EvalOptions,
+) -> Result<Evaluation, EvalError> {
+    match evaluate(truth, estimate, &options) {
+        Err(EvalError::NoPairs { delta: Delta::Seconds(_), .. }) => {
+            options.rpe.retain(|rpe| !matches!(rpe.delta, Delta::Seconds(_)));
+            evaluate(truth, estimate, &options)
+        }
+        result => result,
+    }
+}
+
+/// Poses in the type of the evaluator.
+pub fn to_eval(poses: &[yfslam_io::StampedPose]) -> Vec<StampedPose> {
+    poses.iter().map(|p| StampedPose::new(p.timestamp_ns, p.pose)).collect()
+}

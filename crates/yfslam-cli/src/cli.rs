@@ -1,0 +1,42 @@
+//! The command line: one definition per flag, from which parsing, help and completions follow.
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::command::{completions, config, demo, eval, info, run};
+
+const EXAMPLES: &str = "\
+Examples:
+  yfslam demo                                        what it does, on any machine, without data
+  yfslam run rgbd_bonn_crowd --camera bonn --detector yolo-fastestv2.onnx
+  yfslam eval groundtruth.txt yfslam-out/rgbd_bonn_crowd/trajectory.txt";
+
+/// RGB-D SLAM for scenes in which people walk: frames in, the camera's trajectory out.
+#[derive(Debug, Parser)]
+#[command(name = "yfslam", version, after_help = EXAMPLES, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// How much is said on the way.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct Verbosity {
+    /// Say nothing but warnings and errors.
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Say more; twice for still more.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
+    pub verbose: u8,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    Run(run::RunArgs),
+    Eval(eval::EvalArgs),
+    Demo(demo::DemoArgs),
+    Info(info::InfoArgs),
+    Config(config::ConfigArgs),
+    Completions(completions::CompletionsArgs),
+}

@@ -1,0 +1,28 @@
+//! `yfslam completions`: a completion script for a shell.
+
+use anyhow::Result;
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+use crate::cli::Cli;
+use crate::terminal::print;
+
+const EXAMPLES: &str = "\
+Examples:
+  yfslam completions bash > ~/.local/share/bash-completion/completions/yfslam
+  yfslam completions zsh > ~/.zfunc/_yfslam
+  yfslam completions fish > ~/.config/fish/completions/yfslam.fish";
+
+/// Print a completion script for a shell.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct CompletionsArgs {
+    /// The shell.
+    pub shell: Shell,
+}
+
+pub fn run(args: &CompletionsArgs) -> Result<()> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "yfslam", &mut script);
+    print(&String::from_utf8_lossy(&script))
+}

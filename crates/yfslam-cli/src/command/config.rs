@@ -1,0 +1,27 @@
+//! `yfslam config`: every constant of the system with its meaning.
+
+use anyhow::Result;
+use clap::Args;
+
+use crate::settings::SettingsArgs;
+use crate::terminal::print;
+
+const EXAMPLES: &str = "\
+Examples:
+  yfslam config > yfslam.toml         change what you like, delete the rest
+  yfslam run DIR --config yfslam.toml
+  yfslam config --config yfslam.toml  see what a file amounts to";
+
+/// Print the configuration, each key with its meaning, unit and source.
+///
+/// Without options these are the defaults; with options, what they amount to.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct ConfigArgs {
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+}
+
+pub fn run(args: &ConfigArgs) -> Result<()> {
+    print(&args.settings.resolve()?.to_commented_toml()?)
+}

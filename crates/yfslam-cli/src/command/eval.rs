@@ -1,0 +1,215 @@
+//! `yfslam eval`: how far an estimated trajectory is from the truth.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use serde::Serialize;
+use yfslam_eval::{
+    AlignmentKind, Delta, EvalOptions, Evaluation, RpeOptions, StampedPose, Statistics, Table, TableStyle, evaluate,
+    improvement_percent,
+};
+use yfslam_io::TrajectoryFile;
+
+use crate::accuracy::{MatchArgs, judge, to_eval};
+use crate::terminal::{Terminal, print};
+
+const EXAMPLES: &str = "\
+Examples:
+  yfslam eval groundtruth.txt yfslam-out/walk/trajectory.txt
+  yfslam eval groundtruth.txt yf.txt --versus none.txt             how much better, equation 3 of the YF-SLAM paper
+  yfslam eval groundtruth.txt live.txt --delta 1f --delta 0.5m --json
+  yfslam eval groundtruth.txt mono.txt --scale";
+
+/// Compare an estimated trajectory with the truth: absolute (ATE) and relative (RPE) error.
+///
+/// All files in TUM format: `t tx ty tz qx qy qz qw`, world from camera. The figures are those of the tools of the TUM benchmark and
+/// of `evo`.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct EvalArgs {
+    /// The true trajectory.
+    groundtruth: PathBuf,
+    /// The trajectory to judge.
+    estimate: PathBuf,
+    /// Another estimate, and how much better the first one is.
+    #[arg(long, value_name = "OTHER")]
+    versus: Option<PathBuf>,
+    /// Let the alignment choose the scale too (Sim(3)), as monocular estimates need.
+    #[arg(long)]
+    scale: bool,
+    #[command(flatten)]
+    matching: MatchArgs,
+    /// Span of the relative error: frames (1f), seconds (1s) or metres (0.5m); may be given several times [default: 1f 1s].
+    #[arg(long, value_name = "SPAN", help_heading = "Evaluation")]
+    delta: Vec<Span>,
+    /// Start a span at every pose, not where the last one ended. Spans in seconds always do.
+    #[arg(long, help_heading = "Evaluation")]
+    all_pairs: bool,
+    /// Print JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A span as the user writes it.
+#[derive(Clone, Copy, Debug)]
+struct Span(Delta);
+
+impl FromStr for Span {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let refuse = || format!("'{text}' is no span; write frames as 1f, seconds as 1s, metres as 0.5m");
+        let (number, unit) = text.split_at_checked(text.len().saturating_sub(1)).ok_or_else(refuse)?;
+        let positive = || number.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(refuse);
+        Ok(Self(match unit {
+            "f" => Delta::Frames(number.parse().ok().filter(|n| *n > 0).ok_or_else(refuse)?),
+            "s" => Delta::Seconds(positive()?),
+            "m" => Delta::Metres(positive()?),
+            _ => return Err(refuse()),
+        }))
+    }
+}
+
+impl Span {
+    /// Pairs of this span, as the defaults choose them.
+    fn options(self) -> RpeOptions {
+        match self.0 {
+            Delta::Seconds(_) => RpeOptions { delta: self.0, ..RpeOptions::per_second() },
+            Delta::Frames(_) | Delta::Metres(_) => RpeOptions::new(self.0, false),
+        }
+    }
+}
+
+/// What is printed as JSON.
+#[derive(Serialize)]
+struct Comparison {
+    estimate: Evaluation,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    versus: Option<Evaluation>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    improvement_percent: Option<Vec<Improvement>>,
+}
+
+/// By how much the estimate is better than the other one, % (paper equation 3); `null` where that is undefined.
+#[derive(Serialize)]
+struct Improvement {
+    error: String,
+    rmse: Option<f64>,
+    mean: Option<f64>,
+    median: Option<f64>,
+    std: Option<f64>,
+}
+
+pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
+    let truth = read(&args.groundtruth, terminal)?;
+    let max_diff_ns = args.matching.max_diff_ns()?;
+    let judged = |path: &Path| -> Result<Evaluation> {
+        let estimate = read(path, terminal)?;
+        let options = options(args, max_diff_ns);
+        // A span that was asked for must be there; a default one may be missing.
+        let evaluation = if args.delta.is_empty() {
+            judge(&truth, &estimate, options)
+        } else {
+            evaluate(&truth, &estimate, &options)
+        };
+        evaluation.with_context(|| format!("cannot judge {} by {}", path.display(), args.groundtruth.display()))
+    };
+    let estimate = judged(&args.estimate)?;
+    let versus = args.versus.as_deref().map(judged).transpose()?;
+    let improvement_percent = versus.as_ref().map(|versus| improvements(&estimate, versus));
+    let comparison = Comparison { estimate, versus, improvement_percent };
+    if args.json {
+        return print(&(serde_json::to_string_pretty(&comparison)? + "\n"));
+    }
+    print(&text(args, &comparison))
+}
+
+/// What to measure.
+fn options(args: &EvalArgs, max_diff_ns: u64) -> EvalOptions {
+    let alignment = if args.scale { AlignmentKind::Sim3 } else { AlignmentKind::Se3 };
+    let mut options = EvalOptions { max_diff_ns, alignment, ..Default::default() };
+    if !args.delta.is_empty() {
+        options.rpe = args.delta.iter().map(|span| span.options()).collect();
+    }
+    for rpe in &mut options.rpe {
+        rpe.all_pairs |= args.all_pairs;
+    }
+    options
+}
+
+fn read(path: &Path, terminal: Terminal) -> Result<Vec<StampedPose>> {
+    let file = TrajectoryFile::read(path)?;
+    let skipped = file.duplicates_skipped + file.backward_skipped;
+    if skipped > 0 {
+        terminal.warn(&format!(
+            "{}: {} poses skipped because their stamp repeats, {} because it runs backward",
+            path.display(),
+            file.duplicates_skipped,
+            file.backward_skipped
+        ));
+    }
+    Ok(to_eval(&file.poses))
+}
+
+/// The errors of an evaluation by name, in the order of its table.
+fn errors(evaluation: &Evaluation) -> Vec<(String, Statistics)> {
+    let mut errors = vec![("ATE (m)".to_owned(), evaluation.ate.translation_m)];
+    for rpe in &evaluation.rpe {
+        errors.push((format!("RPE per {} (m)", rpe.options.delta), rpe.translation_m));
+        errors.push((format!("RPE per {} (deg)", rpe.options.delta), rpe.rotation_deg));
+    }
+    errors
+}
+
+fn improvements(ours: &Evaluation, original: &Evaluation) -> Vec<Improvement> {
+    let originals = errors(original);
+    let improvement = |(error, ours): (String, Statistics)| {
+        let (_, original) = originals.iter().find(|(name, _)| *name == error)?;
+        Some(Improvement {
+            rmse: improvement_percent(ours.rmse, original.rmse),
+            mean: improvement_percent(ours.mean, original.mean),
+            median: improvement_percent(ours.median, original.median),
+            std: improvement_percent(ours.std, original.std),
+            error,
+        })
+    };
+    errors(ours).into_iter().filter_map(improvement).collect()
+}
+
+fn text(args: &EvalArgs, comparison: &Comparison) -> String {
+    let (Some(other), Some(versus), Some(improvements)) =
+        (&args.versus, &comparison.versus, &comparison.improvement_percent)
+    else {
+        return comparison.estimate.table(TableStyle::Plain);
+    };
+    let mut table = Table::new(["improvement (%)", "RMSE", "mean", "median", "S.D."]);
+    for i in improvements {
+        let figures = [i.rmse, i.mean, i.median, i.std].map(|v| v.map_or("-".to_owned(), |v| format!("{v:.2}")));
+        table.push([i.error.clone()].into_iter().chain(figures));
+    }
+    format!(
+        "{}\n{}\n{}\n{}\nimprovement of the first over the second, (1 - ours / other) · 100\n{}",
+        args.estimate.display(),
+        comparison.estimate.table(TableStyle::Plain),
+        other.display(),
+        versus.table(TableStyle::Plain),
+        table.render(TableStyle::Plain)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spans_are_read_with_their_unit_and_anything_else_is_refused() {
+        assert_eq!("1f".parse::<Span>().unwrap().0, Delta::Frames(1));
+        assert_eq!("2.5s".parse::<Span>().unwrap().0, Delta::Seconds(2.5));
+        assert_eq!("0.5m".parse::<Span>().unwrap().0, Delta::Metres(0.5));
+        for text in ["", "f", "1", "0f", "1.5f", "-1s", "nanm", "infs", "1é", "1 s s"] {
+            assert!(text.parse::<Span>().unwrap_err().contains(text), "{text}");
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! `yfslam info`: what a sequence holds, before any tracking.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use anyhow::Result;
+use clap::Args;
+use yfslam::image::{Image, RgbImage};
+use yfslam_io::decode::{decode_color, decode_depth};
+use yfslam_io::depth::check_depth_factor;
+use yfslam_io::sequence::{AssociationReport, FrameEntry};
+use yfslam_io::time::{format_stamp, seconds};
+use yfslam_io::{CameraSource, DepthStatistics, Sequence, TrajectoryFile};
+
+use crate::source::{SourceArgs, camera, open_sequence};
+use crate::terminal::print;
+
+/// Frames that are opened, evenly over the sequence.
+const SAMPLES: usize = 20;
+
+const EXAMPLES: &str = "\
+Examples:
+  yfslam info rgbd_dataset_freiburg1_xyz
+  yfslam info DIR --camera bonn --association-tolerance 30
+  yfslam info 'synth:walking_xyz?people=3'";
+
+/// Tell what a sequence holds: frames, rates, gaps, images, depth, camera, ground truth.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct InfoArgs {
+    #[command(flatten)]
+    source: SourceArgs,
+}
+
+pub fn run(args: &InfoArgs) -> Result<()> {
+    print(&if args.source.is_synthetic() { synthetic(&args.source)? } else { recorded(&args.source)? })
+}
+
+fn recorded(args: &SourceArgs) -> Result<String> {
+    let sequence = open_sequence(args)?;
+    let mut text = String::new();
+    writeln!(text, "{}", sequence.folder.display())?;
+    lists(&mut text, &sequence.report)?;
+    timing(&mut text, &sequence)?;
+    let camera = camera(args);
+    images(&mut text, &sequence, camera.as_ref().ok())?;
+    match &camera {
+        Ok(camera) => describe_camera(&mut text, camera)?,
+        Err(error) => writeln!(text, "camera        not usable: {error:#}")?,
+    }
+    match sequence.groundtruth_path() {
+        Some(path) => truth(&mut text, &path, &sequence)?,
+        None => writeln!(text, "ground truth  none (groundtruth.txt)")?,
+    }
+    Ok(text)
+}
+
+fn lists(text: &mut String, report: &AssociationReport) -> Result<()> {
+    let AssociationReport { color_listed, depth_listed, paired, .. } = report;
+    if report.from_associations_file {
+        writeln!(text, "lists         associations.txt: {color_listed} pairs listed, {paired} usable")?;
+    } else {
+        writeln!(text, "lists         rgb.txt {color_listed}, depth.txt {depth_listed} images; {paired} pairs")?;
+    }
+    for (count, what) in [
+        (report.color_unmatched, "colour images without depth in time"),
+        (report.depth_unmatched, "depth images without colour in time"),
+        (report.duplicates_skipped, "entries skipped: duplicate stamp"),
+        (report.backward_skipped, "entries skipped: stamp runs backward"),
+        (report.missing_files, "pairs of which a file is missing"),
+    ] {
+        if count > 0 {
+            writeln!(text, "              {count} {what}")?;
+        }
+    }
+    Ok(())
+}
+
+fn timing(text: &mut String, sequence: &Sequence) -> Result<()> {
+    let info = sequence.info();
+    let stamp = |entry: Option<&FrameEntry>| entry.map_or(String::new(), |e| format_stamp(e.timestamp_ns));
+    let rate = info.rate_hz().map_or("unknown rate".to_owned(), |hz| format!("{hz:.2} Hz"));
+    writeln!(text, "frames        {} in {:.3} s, {rate}", info.frames, seconds(info.duration_ns))?;
+    writeln!(text, "              from {} to {}", stamp(sequence.entries.first()), stamp(sequence.entries.last()))?;
+    let (median_ms, longest_ms) = (seconds(info.median_period_ns) * 1e3, seconds(info.max_gap_ns) * 1e3);
+    writeln!(
+        text,
+        "gaps          {} longer than twice the median period of {median_ms:.1} ms; the longest is {longest_ms:.1} ms",
+        info.gaps
+    )?;
+    let offset = info.offset;
+    writeln!(
+        text,
+        "offset        depth lags colour by {:.1} ms in the median; at most {:.1} ms apart",
+        seconds(offset.median_ns) * 1e3,
+        seconds(offset.max_abs_ns) * 1e3
+    )?;
+    Ok(())
+}
+
+/// Sizes and depths of some images, whatever the camera says.
+fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>) -> Result<()> {
+    let step = sequence.entries.len().div_ceil(SAMPLES).max(1);
+    let (mut sizes, mut depths, mut faults) = (Vec::new(), Vec::new(), Vec::new());
+    let samples = sequence.entries.iter().step_by(step);
+    let opened = samples.len();
+    for entry in samples {
+        match open_images(entry) {
+            Ok((color, depth)) => {
+                sizes.push([color.width(), color.height(), depth.width(), depth.height()]);
+                depths.push(depth);
+            }
+            Err(fault) => faults.push(fault),
+        }
+    }
+    sizes.sort_unstable();
+    sizes.dedup();
+    for [width, height, depth_width, depth_height] in sizes {
+        writeln!(text, "images        colour {width}×{height}, depth {depth_width}×{depth_height} px")?;
+    }
+    if let Some(first) = faults.first() {
+        writeln!(text, "              {} of {opened} opened frames are unusable; the first: {first:#}", faults.len())?;
+    }
+    // Without a camera the unit is unknown: the figures are raw then.
+    let (factor, unit) = camera.map_or((1.0, "raw"), |source| (source.camera.depth_factor, "m"));
+    let Some(d) = DepthStatistics::of(&depths, factor) else { return Ok(()) };
+    writeln!(
+        text,
+        "depth         median {:.3} {unit}, 5 to 95 % in {:.3} to {:.3} {unit}; {:.1} % of pixels measured ({} frames)",
+        d.median_m,
+        d.p5_m,
+        d.p95_m,
+        100.0 * d.valid_share,
+        depths.len()
+    )?;
+    if let (Some(_), Err(error)) = (camera, check_depth_factor(&depths, factor)) {
+        writeln!(text, "              implausible: {error}")?;
+    }
+    Ok(())
+}
+
+fn open_images(entry: &FrameEntry) -> Result<(RgbImage, Image<u16>)> {
+    let (mut color, mut depth) = (RgbImage::default(), Image::default());
+    let read = |path: &Path| std::fs::read(path).map_err(|error| anyhow::anyhow!("{}: {error}", path.display()));
+    let fault = |path: &Path, error| anyhow::anyhow!("{} {error}", path.display());
+    decode_color(&read(&entry.color_path)?, None, &mut color).map_err(|e| fault(&entry.color_path, e))?;
+    decode_depth(&read(&entry.depth_path)?, None, &mut depth).map_err(|e| fault(&entry.depth_path, e))?;
+    Ok((color, depth))
+}
+
+fn describe_camera(text: &mut String, source: &CameraSource) -> Result<()> {
+    let c = &source.camera;
+    writeln!(text, "camera        {}", source.origin)?;
+    writeln!(text, "              {}×{} px, fx {} fy {} cx {} cy {}", c.width, c.height, c.fx, c.fy, c.cx, c.cy)?;
+    let [k1, k2, p1, p2, k3] = c.distortion;
+    writeln!(
+        text,
+        "              k1 {k1} k2 {k2} p1 {p1} p2 {p2} k3 {k3}; depth factor {}, bf {}",
+        c.depth_factor, c.bf
+    )?;
+    Ok(())
+}
+
+fn truth(text: &mut String, path: &Path, sequence: &Sequence) -> Result<()> {
+    let poses = match TrajectoryFile::read(path) {
+        Ok(file) => file.poses,
+        Err(error) => return Ok(writeln!(text, "ground truth  not usable: {error}")?),
+    };
+    let Some((first, last)) = poses.first().zip(poses.last()) else { return Ok(()) };
+    let apply = |stamp_ns| sequence.mirror.map_or(stamp_ns, |mirror| mirror.apply(stamp_ns));
+    let covered = |e: &&FrameEntry| (first.timestamp_ns..=last.timestamp_ns).contains(&apply(e.timestamp_ns));
+    let covered = sequence.entries.iter().filter(covered).count();
+    let path_m: f64 = poses
+        .windows(2)
+        .map(|w| {
+            w.first().zip(w.last()).map_or(0.0, |(a, b)| (b.pose.translation.vector - a.pose.translation.vector).norm())
+        })
+        .sum();
+    writeln!(
+        text,
+        "ground truth  {}: {} poses over {:.3} s and {path_m:.2} m; spans {covered} of {} frames",
+        path.display(),
+        poses.len(),
+        seconds(last.timestamp_ns - first.timestamp_ns),
+        sequence.entries.len()
+    )?;
+    Ok(())
+}
+
+fn synthetic(args: &SourceArgs) -> Result<String> {
+    let source = args.open(false)?;
+    let config = yfslam_synth::parse(&args.sequence)?;
+    let mut text = format!("{}\n", args.sequence);
+    writeln!(
+        text,
+        "frames        {} at {} Hz, rendered as they are played",
+        source.stamps_ns.len(),
+        config.camera.fps
+    )?;
+    writeln!(
+        text,
+        "people        {}, who cover about {:.0} % of the picture",
+        config.people,
+        100.0 * config.person_share
+    )?;
+    describe_camera(&mut text, &source.camera)?;
+    writeln!(text, "ground truth  exact")?;
+    Ok(text)
+}

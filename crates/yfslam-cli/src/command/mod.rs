@@ -1,0 +1,29 @@
+//! One file per subcommand.
+
+pub mod completions;
+pub mod config;
+pub mod demo;
+pub mod eval;
+pub mod info;
+pub mod run;
+
+use anyhow::Result;
+
+use crate::cli::{Cli, Command};
+use crate::terminal::Terminal;
+
+/// Does what the command line asks for.
+///
+/// # Errors
+/// What the subcommand could not do, and the cure.
+pub fn run(cli: &Cli) -> Result<()> {
+    let terminal = Terminal::new(cli.verbosity);
+    match &cli.command {
+        Command::Run(args) => run::run(args, terminal),
+        Command::Eval(args) => eval::run(args, terminal),
+        Command::Demo(args) => demo::run(args, terminal),
+        Command::Info(args) => info::run(args),
+        Command::Config(args) => config::run(args),
+        Command::Completions(args) => completions::run(args),
+    }
+}

@@ -1,0 +1,72 @@
+//! The detector that the user named, timed.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use serde::Serialize;
+use yfslam::image::RgbImage;
+use yfslam::{Config, Detection, Detector, DetectorError};
+use yfslam_detect::{DetectorConfig, YoloFastestV2};
+
+/// Which model found the boxes.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModelIdentity {
+    /// The file.
+    pub file: PathBuf,
+    /// Its size.
+    pub bytes: usize,
+    /// CRC-32 (IEEE 802.3) of the file, hexadecimal.
+    pub crc32: String,
+    /// Number of classes it knows.
+    pub classes: usize,
+}
+
+/// A detector ready to run.
+pub struct LoadedDetector {
+    pub detector: Box<dyn Detector>,
+    /// One duration for each image it has seen.
+    pub times: Receiver<Duration>,
+    pub identity: ModelIdentity,
+}
+
+/// Loads a YOLO-FastestV2 model, set to report every box that the dynamic filter of `config` may use.
+///
+/// # Errors
+/// The file cannot be read, is no ONNX model, or holds another network.
+pub fn load(file: &Path, config: &Config) -> Result<LoadedDetector> {
+    let bytes =
+        std::fs::read(file).with_context(|| format!("cannot read the detector {}; check the path", file.display()))?;
+    let score_threshold = config.dynamic.keep_score.min(config.dynamic.open_score);
+    let detector_config = DetectorConfig { score_threshold, ..Default::default() };
+    let network = YoloFastestV2::from_bytes(&file.display().to_string(), &bytes, &detector_config)?;
+    let identity = ModelIdentity {
+        file: file.into(),
+        bytes: bytes.len(),
+        crc32: format!("{:08x}", crc32fast::hash(&bytes)),
+        classes: network.class_names().len(),
+    };
+    let (sender, times) = channel();
+    Ok(LoadedDetector { detector: Box::new(Timed { network, times: sender }), times, identity })
+}
+
+/// Tells how long each image took.
+struct Timed {
+    network: YoloFastestV2,
+    times: Sender<Duration>,
+}
+
+impl Detector for Timed {
+    fn class_names(&self) -> &[String] {
+        self.network.class_names()
+    }
+
+    fn detect(&mut self, image: &RgbImage, out: &mut Vec<Detection>) -> Result<(), DetectorError> {
+        let started = Instant::now();
+        let result = self.network.detect(image, out);
+        // Whoever stopped listening does not need the time.
+        let _ = self.times.send(started.elapsed());
+        result
+    }
+}

@@ -1,0 +1,192 @@
+//! Takes frames through SLAM and keeps what became of them.
+//!
+//! In: a configuration, a camera, frames. Out: an [`Outcome`]. No truth comes in here.
+
+mod stages;
+mod tally;
+
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use yfslam::geometry::Pose;
+use yfslam::tracking::TrackingState;
+use yfslam::{Camera, Config, RgbdFrame, Slam, Tracked};
+use yfslam_io::StampedPose;
+use yfslam_io::time::format_stamp;
+use yfslam_io::write::PlyPoint;
+
+use crate::detector::LoadedDetector;
+use crate::source::Skip;
+pub use stages::Stages;
+pub use tally::{DynamicTally, FrameTally};
+
+/// SLAM with a record of what happened.
+pub struct Pipeline {
+    slam: Slam,
+    /// Durations of all stages of all frames.
+    pub stages: Stages,
+    frames: FrameTally,
+    dynamic: DynamicTally,
+    live: Vec<StampedPose>,
+    detector_times: Option<Receiver<Duration>>,
+    started: Instant,
+    state: TrackingState,
+    /// Most features, and most of them with depth, in a frame before the map began.
+    best_start: (usize, usize),
+}
+
+/// What came out of a run.
+pub struct Outcome {
+    /// All tracked frames, as the map has them at the end.
+    pub trajectory: Vec<StampedPose>,
+    /// All tracked frames, as they were known at their time.
+    pub live: Vec<StampedPose>,
+    /// The keyframes that are in the map at the end.
+    pub keyframes: Vec<StampedPose>,
+    /// The landmarks.
+    pub landmarks: Vec<PlyPoint>,
+    pub frames: FrameTally,
+    pub dynamic: DynamicTally,
+    pub stages: Stages,
+    /// From the first frame to the last.
+    pub wall: Duration,
+}
+
+impl Pipeline {
+    /// # Errors
+    /// The detector does not know a class that the configuration calls movable.
+    pub fn new(config: &Config, camera: &Camera, detector: Option<LoadedDetector>) -> Result<Self> {
+        let (detector, times) = detector.map(|d| (d.detector, d.times)).unzip();
+        Ok(Self {
+            slam: Slam::new(config.clone(), camera, detector)?,
+            stages: Stages::default(),
+            frames: FrameTally::default(),
+            dynamic: DynamicTally::default(),
+            live: Vec::new(),
+            detector_times: times,
+            started: Instant::now(),
+            state: TrackingState::default(),
+            best_start: (0, 0),
+        })
+    }
+
+    /// Takes one frame through SLAM.
+    pub fn track(&mut self, frame: &RgbdFrame) -> Tracked {
+        let started = Instant::now();
+        let tracked = self.slam.track(frame);
+        self.log(&tracked);
+        self.stages.push("frame", started.elapsed());
+        self.note_times(&tracked);
+        self.frames.count(tracked.state);
+        self.dynamic.count(&self.slam);
+        if let Some(pose) = tracked.t_world_cam {
+            self.live.push(StampedPose { timestamp_ns: tracked.timestamp_ns, pose });
+        } else if self.frames.tracked == 0 {
+            self.note_start();
+        }
+        tracked
+    }
+
+    /// Counts a frame that cannot be used.
+    pub fn skip(&mut self, skip: Skip) {
+        tracing::info!("skipped {}", skip.message);
+        self.frames.skip(skip);
+    }
+
+    /// The system as the last frame left it.
+    pub fn slam(&self) -> &Slam {
+        &self.slam
+    }
+
+    /// What became of the frames so far.
+    pub fn frames(&self) -> &FrameTally {
+        &self.frames
+    }
+
+    fn log(&mut self, tracked: &Tracked) {
+        let (frame, time) = (self.frames.total(), format_stamp(tracked.timestamp_ns));
+        if tracked.state != self.state {
+            tracing::info!(frame, %time, before = ?self.state, now = ?tracked.state, "state");
+            self.state = tracked.state;
+        }
+        tracing::debug!(frame, %time, inliers = tracked.inliers, keyframe = tracked.is_keyframe, "frame");
+    }
+
+    fn note_times(&mut self, tracked: &Tracked) {
+        let times = &tracked.times;
+        self.stages.push("features", times.features);
+        if let Some(detector_times) = &self.detector_times {
+            for took in detector_times.try_iter() {
+                self.stages.push("detector", took);
+            }
+            self.stages.push("detector wait", times.detector_wait);
+        }
+        self.stages.push("dynamic filter", times.dynamic);
+        self.stages.push("tracking", times.tracking);
+        if tracked.is_keyframe {
+            self.stages.push("mapping", times.mapping);
+        }
+    }
+
+    fn note_start(&mut self) {
+        let features = &self.slam.last_frame().features.features;
+        let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
+        self.best_start = self.best_start.max((features.len(), with_depth));
+    }
+
+    /// Ends the run.
+    ///
+    /// # Errors
+    /// No frame was tracked; the message says why.
+    pub fn finish(mut self, config: &Config) -> Result<Outcome> {
+        let wall = self.started.elapsed();
+        self.frames.detector_failures = self.slam.detector_failures();
+        if self.frames.tracked == 0 {
+            self.fail(config)?;
+        }
+        let map = self.slam.map();
+        let mut keyframes: Vec<_> = map.keyframes().map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
+        keyframes.sort_by_key(|&(sequence, ..)| sequence);
+        let landmark =
+            |l: &yfslam::map::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
+        Ok(Outcome {
+            trajectory: self.slam.trajectory().into_iter().map(stamped).collect(),
+            live: self.live,
+            keyframes: keyframes.into_iter().map(|(_, t, t_cam_world)| stamped((t, t_cam_world.inverse()))).collect(),
+            landmarks: map.landmarks().map(|(_, l)| landmark(l)).collect(),
+            frames: self.frames,
+            dynamic: self.dynamic,
+            stages: self.stages,
+            wall,
+        })
+    }
+
+    /// Why there is no trajectory.
+    fn fail(&self, config: &Config) -> Result<()> {
+        let FrameTally { read, skipped, first_skipped, .. } = &self.frames;
+        if *read == 0 {
+            let first = first_skipped.as_deref().unwrap_or("the sequence has no frames");
+            bail!("no trajectory: none of the {skipped} frames can be used; the first: {first}");
+        }
+        let (features, with_depth) = self.best_start;
+        bail!(
+            "no trajectory: no map could be begun in {read} frames ({skipped} skipped); the best had {features} features, \
+             {with_depth} of them static and with depth, but tracking.init_min_features asks for {} and \
+             tracking.init_min_landmarks for {}; check camera and depth factor with `yfslam info`, or lower these in --config",
+            config.tracking.init_min_features,
+            config.tracking.init_min_landmarks
+        );
+    }
+}
+
+fn stamped((timestamp_ns, pose): (i64, Pose)) -> StampedPose {
+    StampedPose { timestamp_ns, pose }
+}
+
+impl Outcome {
+    /// Frames per second, from the first frame to the last, of everything together.
+    pub fn fps(&self) -> f64 {
+        self.frames.total() as f64 / self.wall.as_secs_f64().max(1e-9)
+    }
+}

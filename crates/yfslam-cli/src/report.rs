@@ -1,0 +1,128 @@
+//! What `run.json` says about a run.
+
+use serde::Serialize;
+use yfslam::{Camera, Config};
+use yfslam_eval::Evaluation;
+use yfslam_io::sequence::AssociationReport;
+
+use crate::detector::ModelIdentity;
+use crate::pipeline::{DynamicTally, FrameTally, Outcome, Stages};
+use crate::source::{Source, Truth};
+
+/// What a report is made of.
+#[derive(Clone, Copy)]
+pub struct Run<'a> {
+    /// As the user named it.
+    pub sequence: &'a str,
+    pub source: &'a Source,
+    pub boxes: BoxSource<'a>,
+    pub outcome: &'a Outcome,
+    pub truth: Option<&'a Truth>,
+    pub evaluation: Option<&'a Evaluation>,
+    pub config: &'a Config,
+}
+
+/// Everything that `run.json` says.
+#[derive(Serialize)]
+pub struct Report<'a> {
+    /// Version of this program.
+    pub yfslam: &'static str,
+    pub sequence: &'a str,
+    pub camera_origin: &'a str,
+    pub camera: &'a Camera,
+    /// Where the boxes of movable objects come from.
+    pub boxes: BoxSource<'a>,
+    pub frames: &'a FrameTally,
+    /// What was left out when colour and depth images were paired.
+    pub association: Option<Association>,
+    pub dynamic: &'a DynamicTally,
+    pub map: MapSize,
+    /// Wall time of each stage over all frames; `mapping` over keyframes. `detector` runs beside `features`, decoding beside all.
+    pub times: &'a Stages,
+    pub wall_s: f64,
+    pub fps: f64,
+    /// Peak resident memory, MB (10⁶ bytes); `null` where the system does not tell.
+    pub peak_memory_mb: Option<f64>,
+    /// Errors against the ground truth, if there is one.
+    pub groundtruth: Option<&'a str>,
+    pub evaluation: Option<&'a Evaluation>,
+    /// The resolved configuration.
+    pub config: &'a Config,
+}
+
+/// Where the boxes of movable objects come from.
+#[derive(Clone, Copy, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BoxSource<'a> {
+    /// The method needs none.
+    None,
+    /// The synthetic world knows them.
+    Renderer,
+    /// A network.
+    Detector(&'a ModelIdentity),
+}
+
+#[derive(Serialize)]
+pub struct MapSize {
+    pub keyframes: usize,
+    pub landmarks: usize,
+}
+
+/// What was left out when colour and depth images were paired.
+#[derive(Serialize)]
+pub struct Association {
+    pub color_listed: usize,
+    pub depth_listed: usize,
+    pub paired: usize,
+    pub color_unmatched: usize,
+    pub depth_unmatched: usize,
+    pub duplicate_stamps_skipped: usize,
+    pub backward_stamps_skipped: usize,
+}
+
+impl<'a> Report<'a> {
+    /// The report of one run.
+    pub fn new(run: &Run<'a>) -> Self {
+        let Run { sequence, source, boxes, outcome, truth, evaluation, config } = *run;
+        Self {
+            yfslam: env!("CARGO_PKG_VERSION"),
+            sequence,
+            camera_origin: &source.camera.origin,
+            camera: &source.camera.camera,
+            boxes,
+            frames: &outcome.frames,
+            association: source.association.as_ref().map(Association::from),
+            dynamic: &outcome.dynamic,
+            map: MapSize { keyframes: outcome.keyframes.len(), landmarks: outcome.landmarks.len() },
+            times: &outcome.stages,
+            wall_s: outcome.wall.as_secs_f64(),
+            fps: outcome.fps(),
+            peak_memory_mb: peak_memory_mb(),
+            groundtruth: truth.map(|truth| truth.origin.as_str()),
+            evaluation,
+            config,
+        }
+    }
+}
+
+impl From<&AssociationReport> for Association {
+    fn from(report: &AssociationReport) -> Self {
+        Self {
+            color_listed: report.color_listed,
+            depth_listed: report.depth_listed,
+            paired: report.paired,
+            color_unmatched: report.color_unmatched,
+            depth_unmatched: report.depth_unmatched,
+            duplicate_stamps_skipped: report.duplicates_skipped,
+            backward_stamps_skipped: report.backward_skipped,
+        }
+    }
+}
+
+/// Peak resident memory of this process, MB (10⁶ bytes); `None` where the system does not tell.
+fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some((kib * 1.024 / 1e2).round() / 10.0)
+}

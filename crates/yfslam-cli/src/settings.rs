@@ -1,0 +1,79 @@
+//! From a configuration file and flags to one configuration: flags win over the file, the file over the defaults.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum, value_parser};
+use yfslam::Config;
+use yfslam::dynamic::Method;
+use yfslam::dynamic::depth_group::Grouping;
+
+/// What can be set about the system.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "System")]
+pub struct SettingsArgs {
+    /// How moving things are kept out [default: yf].
+    #[arg(long, value_enum, value_name = "METHOD", hide_default_value = true)]
+    pub method: Option<MethodArg>,
+    /// How the depth group of a moving body is found [default: exact].
+    #[arg(long, value_enum, value_name = "GROUPING")]
+    pub grouping: Option<GroupingArg>,
+    /// Seed of every random draw [default: 0].
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(..=i64::MAX as u64))]
+    pub seed: Option<u64>,
+    /// Settings that differ from the defaults; `yfslam config` prints them all.
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+}
+
+/// How moving things are kept out.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum MethodArg {
+    /// Every feature is trusted, as in ORB-SLAM2.
+    None,
+    /// Every feature inside a box is dropped.
+    Boxes,
+    /// YF-SLAM: inside a box the depth group of the body is dropped, the background stays.
+    Yf,
+}
+
+/// How the depth group of a moving body is found.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum GroupingArg {
+    /// A search over all depths; the same for every seed.
+    Exact,
+    /// The paper's Geometric Depth RANSAC, seeded.
+    Ransac,
+}
+
+impl SettingsArgs {
+    /// The configuration that file and flags amount to.
+    ///
+    /// # Errors
+    /// The file cannot be read, or holds an unknown key or a value of the wrong type.
+    pub fn resolve(&self) -> Result<Config> {
+        let mut config = match &self.config {
+            Some(path) => {
+                let text = std::fs::read_to_string(path)
+                    .with_context(|| format!("cannot read the configuration {}; check the path", path.display()))?;
+                Config::from_toml(&text)
+                    .with_context(|| format!("{}: see `yfslam config` for all keys", path.display()))?
+            }
+            None => Config::default(),
+        };
+        let dynamic = &mut config.dynamic;
+        match self.method {
+            Some(MethodArg::None) => dynamic.method = Method::None,
+            Some(MethodArg::Boxes) => dynamic.method = Method::Boxes,
+            Some(MethodArg::Yf) => dynamic.method = Method::Yf,
+            None => {}
+        }
+        match self.grouping {
+            Some(GroupingArg::Exact) => dynamic.grouping = Grouping::Exact,
+            Some(GroupingArg::Ransac) => dynamic.grouping = Grouping::Ransac,
+            None => {}
+        }
+        dynamic.seed = self.seed.unwrap_or(dynamic.seed);
+        Ok(config)
+    }
+}

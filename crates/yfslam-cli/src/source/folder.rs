@@ -1,0 +1,96 @@
+//! Recorded sequences in TUM RGB-D or Bonn layout.
+
+use std::io::ErrorKind;
+
+use anyhow::{Result, ensure};
+use yfslam::RgbdFrame;
+use yfslam_io::camera::check_camera;
+use yfslam_io::decode::DecodeError;
+use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
+use yfslam_io::{
+    CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, detect_camera,
+    load_camera,
+};
+
+use super::{Frames, Skip, Source, SourceArgs};
+use crate::pipeline::Stages;
+
+/// Opens the folder, finds its camera and checks both against the first frames.
+pub fn open(args: &SourceArgs) -> Result<Source> {
+    let sequence = open_sequence(args)?;
+    let camera = camera(args)?;
+    check_recording(&sequence, &camera.camera)?;
+    let frames = Frames::Folder(FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?);
+    Ok(Source {
+        name: name(args),
+        camera,
+        frames,
+        stamps_ns: sequence.entries.iter().map(|entry| entry.timestamp_ns).collect(),
+        association: Some(sequence.report),
+        mirror: sequence.mirror,
+    })
+}
+
+/// Reads the lists of the folder.
+///
+/// # Errors
+/// A tolerance that is none, or a folder without usable lists.
+pub fn open_sequence(args: &SourceArgs) -> Result<Sequence> {
+    let tolerance_ms = args.association_tolerance;
+    ensure!(
+        (0.0..=1e6).contains(&tolerance_ms),
+        "--association-tolerance is {tolerance_ms}; give milliseconds, such as 20"
+    );
+    let options = SequenceOptions {
+        association_tolerance_ns: (tolerance_ms * 1e6) as i64,
+        start: args.start,
+        end: args.end,
+        reverse: args.reverse,
+    };
+    Ok(Sequence::open(args.folder(), &options)?)
+}
+
+/// The camera that was asked for, or that of the folder.
+pub fn camera(args: &SourceArgs) -> Result<CameraSource> {
+    let mut source = match &args.camera {
+        Some(spec) => load_camera(spec, Some(args.folder()))?,
+        None => detect_camera(args.folder())?,
+    };
+    if let Some(factor) = args.depth_factor {
+        source.camera.depth_factor = factor;
+        source.origin += &format!(" with --depth-factor {factor}");
+        check_camera(&source.camera, &source.origin)?;
+    }
+    Ok(source)
+}
+
+/// The folder's own name, also for `.` and the like.
+fn name(args: &SourceArgs) -> String {
+    let folder = args.folder().canonicalize().unwrap_or_else(|_| args.folder().into());
+    folder.file_name().map_or("sequence".into(), |name| name.to_string_lossy().into_owned())
+}
+
+pub fn next(stream: &mut FrameStream, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
+    let before = stream.times();
+    let frame = stream.next()?;
+    let after = stream.times();
+    stages.push("decode color", after.color - before.color);
+    stages.push("decode depth", after.depth - before.depth);
+    stages.push("decode wait", after.waited - before.waited);
+    Some(frame.map_err(|error| Skip { reason: reason(&error.fault), message: error.to_string() }))
+}
+
+/// The kind of fault, for counting.
+fn reason(fault: &FrameFault) -> &'static str {
+    match fault {
+        FrameFault::Unreadable(Error::Read { source, .. }) if source.kind() == ErrorKind::NotFound => "missing file",
+        FrameFault::Unreadable(_) => "unreadable file",
+        FrameFault::Image { source, .. } => match source {
+            DecodeError::UnknownFormat(_) | DecodeError::WrongKind { .. } => "wrong type of image",
+            DecodeError::WrongSize { .. } | DecodeError::TooLarge(_) => "wrong size of image",
+            DecodeError::Damaged(_) => "damaged image",
+        },
+        FrameFault::NoDepth { .. } => "no depth in any pixel",
+        FrameFault::DecoderStopped => "decoder stopped",
+    }
+}

@@ -1,0 +1,77 @@
+//! What the program says: results on standard output, everything else on standard error.
+
+use std::io::{self, IsTerminal, Write};
+
+use anyhow::Result;
+
+use crate::cli::Verbosity;
+
+/// Says things as loudly as the user wants.
+#[derive(Clone, Copy, Debug)]
+pub struct Terminal {
+    verbosity: Verbosity,
+}
+
+impl Terminal {
+    /// Starts logging too, at the level that `verbosity` asks for.
+    pub fn new(verbosity: Verbosity) -> Self {
+        let level = match verbosity.verbose {
+            0 => tracing::Level::WARN,
+            1 => tracing::Level::INFO,
+            2 => tracing::Level::DEBUG,
+            _ => tracing::Level::TRACE,
+        };
+        // Fails only if logging was started before, and then it runs.
+        let _ = tracing_subscriber::fmt().with_max_level(level).with_writer(io::stderr).without_time().try_init();
+        Self { verbosity }
+    }
+
+    /// Whether progress and notes are unwanted.
+    pub fn is_quiet(self) -> bool {
+        self.verbosity.quiet
+    }
+
+    /// Whether progress can be drawn in place: log lines would tear it.
+    pub fn draws(self) -> bool {
+        !self.is_quiet() && self.verbosity.verbose == 0 && io::stderr().is_terminal()
+    }
+
+    /// A result that is not printed if the user wants silence.
+    pub fn result(self, text: &str) -> Result<()> {
+        if self.is_quiet() { Ok(()) } else { print(text) }
+    }
+
+    /// Something worth knowing.
+    pub fn note(self, text: &str) {
+        if !self.is_quiet() {
+            say("note", text);
+        }
+    }
+
+    /// Something that may be wrong.
+    pub fn warn(self, text: &str) {
+        say("warning", text);
+    }
+}
+
+/// Prints what the user asked for.
+pub fn print(text: &str) -> Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes())?;
+    Ok(out.flush()?)
+}
+
+/// Why the program ends without success.
+pub fn error(error: &anyhow::Error) {
+    say("error", &format!("{error:#}"));
+}
+
+/// Whether the reader of our output has gone, as `head` does: no failure of ours.
+pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
+
+fn say(kind: &str, text: &str) {
+    // Nobody is left to tell if standard error is closed.
+    let _ = writeln!(io::stderr().lock(), "{kind}: {text}");
+}
