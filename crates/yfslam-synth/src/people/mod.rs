@@ -96,7 +96,7 @@ impl Person {
         let (joints, x, y, heading, seat_z) = match &self.plan {
             Plan::Walk(walkway) => {
                 let step = walkway.at(time);
-                let joints = gait::walk(p, step.distance as f32, step.speed as f32);
+                let joints = gait::walk(p, step.distance as f32, step.speed as f32, self.seed, time as f32);
                 (joints, step.position[0] as f32, step.position[1] as f32, step.heading as f32, None)
             }
             Plan::Sit(s) => {
