@@ -48,6 +48,11 @@ pub struct RotationHistogram {
 }
 
 impl RotationHistogram {
+    /// Forgets all matches.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+    }
+
     /// Notes that match `payload` turned by `turn_rad`, any angle.
     pub fn add(&mut self, turn_rad: f32, payload: u32) {
         let turns = turn_rad / std::f32::consts::TAU;
