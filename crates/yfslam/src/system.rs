@@ -49,6 +49,33 @@ pub enum SetupError {
     Thread(#[from] std::io::Error),
 }
 
+/// A frame that cannot be used. The system goes on with the next one as if this one had not come.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FrameRejected {
+    /// The images do not fit the camera.
+    #[error("the {image} image is {width}x{height}, the camera {camera_width}x{camera_height}: give the calibration of this size")]
+    Size {
+        /// Which image: colour or depth.
+        image: &'static str,
+        /// Its width, px.
+        width: usize,
+        /// Its height, px.
+        height: usize,
+        /// The camera's width, px.
+        camera_width: usize,
+        /// The camera's height, px.
+        camera_height: usize,
+    },
+    /// The clock did not advance.
+    #[error("the time stamp {timestamp_ns} ns does not come after {last_ns} ns, that of the last frame: the frame is repeated or late")]
+    Time {
+        /// Stamp of the frame, ns.
+        timestamp_ns: i64,
+        /// Stamp of the frame before, ns.
+        last_ns: i64,
+    },
+}
+
 /// Wall time of the stages of one frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StageTimes {
@@ -90,6 +117,8 @@ pub struct Slam {
     movable_classes: Vec<usize>,
     movable: Vec<Detection>,
     detector_failures: usize,
+    last_timestamp_ns: Option<i64>,
+    resets: usize,
 }
 
 impl Slam {
@@ -119,6 +148,8 @@ impl Slam {
             movable_classes,
             movable: Vec::new(),
             detector_failures: 0,
+            last_timestamp_ns: None,
+            resets: 0,
             sensor: SensorModel::new(camera, &config, extractor.scale_factors()),
             config,
             extractor,
@@ -133,7 +164,11 @@ impl Slam {
     }
 
     /// Takes one frame through all stages.
-    pub fn track(&mut self, frame: &RgbdFrame) -> Tracked {
+    ///
+    /// # Errors
+    /// If the images do not have the camera's size, or the time stamp is not later than that of the last frame.
+    pub fn track(&mut self, frame: &RgbdFrame) -> Result<Tracked, FrameRejected> {
+        self.check(frame)?;
         let mut times = StageTimes::default();
         let mut clock = Stopwatch::start();
         let detecting = self.start_detector(frame);
@@ -167,17 +202,37 @@ impl Slam {
         self.state = match (tracked, self.state) {
             (true, _) => TrackingState::Tracking,
             (false, TrackingState::NotInitialized) => TrackingState::NotInitialized,
+            (false, _) if self.map.keyframe_count() <= self.config.tracking.reset_max_keyframes => self.reset(),
             (false, _) => TrackingState::Lost,
         };
         self.note_anchor(frame.timestamp_ns);
-        Tracked {
+        Ok(Tracked {
             timestamp_ns: frame.timestamp_ns,
             state: self.state,
             t_world_cam: tracked.then(|| self.tracker.current.t_cam_world.inverse()),
             is_keyframe,
             inliers: self.tracker.inliers,
             times,
+        })
+    }
+
+    /// Refuses a frame that no stage could work with.
+    fn check(&mut self, frame: &RgbdFrame) -> Result<(), FrameRejected> {
+        let (camera_width, camera_height) = (self.sensor.camera.width, self.sensor.camera.height);
+        let sizes = [
+            ("colour", frame.color.width(), frame.color.height()),
+            ("depth", frame.depth.raw.width(), frame.depth.raw.height()),
+        ];
+        for (image, width, height) in sizes {
+            if (width, height) != (camera_width, camera_height) {
+                return Err(FrameRejected::Size { image, width, height, camera_width, camera_height });
+            }
         }
+        if let Some(last_ns) = self.last_timestamp_ns.filter(|last| *last >= frame.timestamp_ns) {
+            return Err(FrameRejected::Time { timestamp_ns: frame.timestamp_ns, last_ns });
+        }
+        self.last_timestamp_ns = Some(frame.timestamp_ns);
+        Ok(())
     }
 
     /// Hands the image to the detector unless the frame brings its boxes along. Returns whether boxes are to be waited for.
@@ -236,6 +291,18 @@ impl Slam {
             && with_depth >= self.config.tracking.init_min_landmarks
     }
 
+    /// Throws the map away and starts over with the next frame: a map this young is worth less than a fresh start (ORB-SLAM2). The poses
+    /// that hung on it go with it.
+    fn reset(&mut self) -> TrackingState {
+        tracing::warn!(keyframes = self.map.keyframe_count(), "lost soon after the start: the map is begun anew");
+        self.map = Map::default();
+        self.anchors.clear();
+        self.tracker.reset();
+        self.mapper.reset();
+        self.resets += 1;
+        TrackingState::NotInitialized
+    }
+
     fn note_anchor(&mut self, timestamp_ns: i64) {
         if self.state == TrackingState::Tracking
             && let Some((reference, t_cam_reference)) = self.tracker.current.reference
@@ -253,6 +320,11 @@ impl Slam {
                 Some((a.timestamp_ns, t_cam_world.inverse()))
             })
             .collect()
+    }
+
+    /// How often the map was begun anew because tracking was lost soon after the start. Poses given out before belong to another world.
+    pub fn resets(&self) -> usize {
+        self.resets
     }
 
     /// Frames on which the detector failed.

@@ -65,8 +65,8 @@ pub fn run(args: &DemoArgs, terminal: Terminal) -> Result<()> {
         // Rendered frames are always usable.
         let Ok(frame) = frame else { continue };
         for pipeline in &mut pipelines {
-            let tracked = pipeline.track(&frame);
-            progress.frame(pipeline.frames(), tracked.state);
+            let state = pipeline.track(&frame);
+            progress.frame(pipeline.frames(), state);
         }
     }
     progress.finish();

@@ -142,7 +142,7 @@ fn drive(source: &mut Source, pipeline: &mut Pipeline, pictures: Option<&Overlay
     while let Some(frame) = source.frames.next(&mut pipeline.stages) {
         match frame {
             Ok(frame) => {
-                state = pipeline.track(&frame).state;
+                state = pipeline.track(&frame);
                 if let Some(pictures) = pictures {
                     pictures.write(pipeline.frames().total() - 1, &frame, pipeline.slam())?;
                 }

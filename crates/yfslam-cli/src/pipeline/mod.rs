@@ -29,6 +29,7 @@ pub struct Pipeline {
     frames: FrameTally,
     dynamic: DynamicTally,
     live: Vec<StampedPose>,
+    resets: usize,
     detector_times: Option<Receiver<Duration>>,
     started: Instant,
     state: TrackingState,
@@ -64,6 +65,7 @@ impl Pipeline {
             frames: FrameTally::default(),
             dynamic: DynamicTally::default(),
             live: Vec::new(),
+            resets: 0,
             detector_times: times,
             started: Instant::now(),
             state: TrackingState::default(),
@@ -71,21 +73,33 @@ impl Pipeline {
         })
     }
 
-    /// Takes one frame through SLAM.
-    pub fn track(&mut self, frame: &RgbdFrame) -> Tracked {
+    /// Takes one frame through SLAM; one that it refuses is counted as skipped. Returns the state after it.
+    pub fn track(&mut self, frame: &RgbdFrame) -> TrackingState {
         let started = Instant::now();
-        let tracked = self.slam.track(frame);
+        let tracked = match self.slam.track(frame) {
+            Ok(tracked) => tracked,
+            Err(rejected) => {
+                self.skip(Skip { reason: "refused by the tracker", message: rejected.to_string() });
+                return self.state;
+            }
+        };
         self.log(&tracked);
         self.stages.push("frame", started.elapsed());
         self.note_times(&tracked);
         self.frames.count(tracked.state);
         self.dynamic.count(&self.slam);
+        if self.slam.resets() > self.resets {
+            // A new map is a new world: poses of the old one do not belong to this trajectory.
+            self.resets = self.slam.resets();
+            self.live.clear();
+            self.frames.restart();
+        }
         if let Some(pose) = tracked.t_world_cam {
             self.live.push(StampedPose { timestamp_ns: tracked.timestamp_ns, pose });
         } else if self.frames.tracked == 0 {
             self.note_start();
         }
-        tracked
+        tracked.state
     }
 
     /// Counts a frame that cannot be used.

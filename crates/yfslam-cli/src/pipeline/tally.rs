@@ -40,6 +40,11 @@ impl FrameTally {
         }
     }
 
+    /// The map was begun anew: what was tracked before has lost its world.
+    pub fn restart(&mut self) {
+        self.lost += std::mem::take(&mut self.tracked);
+    }
+
     /// Counts a frame that could not be used.
     pub fn skip(&mut self, Skip { reason, message }: Skip) {
         self.skipped += 1;

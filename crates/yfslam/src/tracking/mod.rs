@@ -63,6 +63,10 @@ impl Tracker {
 
     /// A first pose from the last frame, else from the reference keyframe. Returns whether one was found.
     pub fn estimate(&mut self, sensor: &SensorModel, config: &Config, map: &Map) -> bool {
+        let gap_s = (self.current.timestamp_ns - self.last.timestamp_ns) as f64 * 1e-9;
+        if gap_s > config.tracking.max_gap_s {
+            self.velocity = None;
+        }
         (self.velocity.is_some() && self.track_motion(sensor, config, map)) || self.track_reference(sensor, config, map)
     }
 
