@@ -1,4 +1,51 @@
 //! RGB-D visual SLAM for scenes in which people walk.
+//!
+//! What a frame goes through ([`Slam::track`] has it on one page):
+//!
+//! ```text
+//! RgbdFrame ─┬─► features ──────────► dynamic ──────► tracking ──pose──► Tracked
+//!            │   corners, depth       who may move?   last frame, then local map
+//!            └─► Detector ──boxes────►                    │ worth a keyframe?
+//!                (a thread of its own, joined here)       ▼
+//!                                                      mapping ──► map
+//!                                                      landmarks, local bundle adjustment
+//! ```
+//!
+//! | module | what it knows |
+//! |---|---|
+//! | [`image`], [`features`] | one image: pyramid, FAST, ORB; [`features::FrameFeatures`] adds depth, undistortion and a search grid |
+//! | [`geometry`], [`camera`], [`sensor`] | rigid motions, the lens, the noise of corners and depths |
+//! | [`optimize`] | least squares: one pose, or a window of poses and points |
+//! | [`map`] | keyframes and landmarks, their invariants, the only code that changes them |
+//! | [`dynamic`] | how far a feature may be trusted to be static; nothing else knows that people exist |
+//! | [`tracking`] | the pose of each frame; when to make a keyframe |
+//! | [`mapping`] | growth and refinement of the map |
+//! | [`system`] | the whole path |
+//!
+//! Frames are named: `t_cam_world` maps points of the world into the camera. Lengths are metres, times integer nanoseconds. The same
+//! frames give the same bits on every run.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use yfslam::image::{DepthImage, Image, RgbImage};
+//! use yfslam::{Camera, Config, RgbdFrame, Slam};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let camera = Camera {
+//!     width: 640, height: 480, fx: 535.4, fy: 539.2, cx: 320.1, cy: 247.6,
+//!     distortion: [0.0; 5], depth_factor: 5000.0, fps: 30.0, bf: 40.0,
+//! };
+//! let mut slam = Slam::new(Config::default(), &camera, None)?;
+//! let frame = RgbdFrame {
+//!     timestamp_ns: 0,
+//!     color: Arc::new(RgbImage::new(640, 480)),
+//!     depth: Arc::new(DepthImage { raw: Image::new(640, 480), metres_per_unit: 1.0 / 5000.0 }),
+//!     detections: None,
+//! };
+//! let tracked = slam.track(&frame)?;
+//! assert!(tracked.t_world_cam.is_none(), "a blank picture starts no map");
+//! # Ok(()) }
+//! ```
 #![warn(missing_docs)]
 
 pub mod camera;
