@@ -1,0 +1,111 @@
+//! The per-frame path reuses its buffers. One test function: the counter is the whole process's.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use yfslam::config::{Config, FeatureConfig};
+use yfslam::features::{Features, OrbExtractor};
+use yfslam::image::{DepthImage, GrayImage, Image, RgbImage, gray_from_rgb};
+use yfslam::{BoundingBox, Camera, Detection, RgbdFrame, Slam};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call is handed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promises are those `System` asks for.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: as above.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Random fields of 8 × 8 px.
+fn texture(seed: u32) -> RgbImage {
+    let mut image = RgbImage::new(640, 480);
+    for (pixel, i) in image.data_mut().iter_mut().zip(0u32..) {
+        let field = (i % 640 / 8) * 7919 + (i / 640 / 8) * 104_729 + seed;
+        *pixel = [field.wrapping_mul(2_654_435_761).to_be_bytes()[0]; 3];
+    }
+    image
+}
+
+#[test]
+fn a_frame_that_is_no_keyframe_allocates_nothing() {
+    extraction_allocates_nothing_after_the_first_frame();
+    tracking_allocates_nothing_between_keyframes();
+}
+
+/// A camera at rest before a wall, a person's box in the picture.
+fn tracking_allocates_nothing_between_keyframes() {
+    let camera = Camera {
+        width: 640,
+        height: 480,
+        fx: 535.4,
+        fy: 539.2,
+        cx: 320.1,
+        cy: 247.6,
+        distortion: [0.0; 5],
+        depth_factor: 5000.0,
+        fps: 30.0,
+        bf: 40.0,
+    };
+    let mut slam = Slam::new(Config::default(), &camera, None).unwrap();
+    let mut raw = Image::new(640, 480);
+    raw.data_mut().fill(9000u16);
+    let bbox = BoundingBox { x_min: 100.0, y_min: 50.0, x_max: 250.0, y_max: 470.0 };
+    let mut frame = RgbdFrame {
+        timestamp_ns: 0,
+        color: Arc::new(texture(3)),
+        depth: Arc::new(DepthImage { raw, metres_per_unit: 1.0 / 5000.0 }),
+        detections: Some(vec![Detection { class: 0, score: 0.9, bbox }]),
+    };
+    let mut quiet = 0;
+    for i in 0..60 {
+        frame.timestamp_ns = i * 33_000_000;
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let tracked = slam.track(&frame).unwrap();
+        let allocations = ALLOCATIONS.load(Ordering::Relaxed) - before;
+        assert!(tracked.t_world_cam.is_some());
+        // The list of tracked frames grows by doubling: at 16, 32 and 64.
+        if i > 20 && !tracked.is_keyframe && i != 32 {
+            assert_eq!(allocations, 0, "frame {i}");
+            quiet += 1;
+        }
+    }
+    assert!(quiet > 20, "only {quiet} frames were no keyframes");
+}
+
+fn extraction_allocates_nothing_after_the_first_frame() {
+    let frames = [texture(1), texture(2)];
+    let mut extractor = OrbExtractor::new(&FeatureConfig::default());
+    let (mut gray, mut features) = (GrayImage::default(), Features::default());
+    let mut run = || {
+        for frame in &frames {
+            gray_from_rgb(frame, &mut gray);
+            extractor.extract(&gray, &mut features);
+            assert_eq!(features.key_points.len(), 1000);
+        }
+    };
+    run();
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    assert!(before > 0);
+    run();
+    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed), before);
+}
