@@ -1,5 +1,5 @@
-//! Times the forward pass and the whole `detect` on one thread: process CPU time, minimum and median, as one JSON line per
-//! instruction set.
+//! Times the forward pass and the whole `detect` on one thread: process CPU time of every run, as one JSON line per
+//! instruction set; `benches/peers_detector.py` compares it with other engines.
 //!
 //! `cargo run --release -p yfslam-detect --example time_detector -- model.onnx [runs]`
 #![allow(clippy::print_stdout, reason = "the result goes to standard output")]
@@ -27,25 +27,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         let detect = time(runs, || detector.detect(&image, &mut found))?;
         let level = format!("{level:?}");
         let level = level.split('(').next().unwrap_or_default();
-        println!(
-            "{{\"level\": \"{level}\", \"forward_ms\": {:.3}, \"forward_median_ms\": {:.3}, \"detect_ms\": {:.3}, \
-             \"detect_median_ms\": {:.3}}}",
-            forward.0, forward.1, detect.0, detect.1
-        );
+        println!("{{\"level\": \"{level}\", \"forward_all_ms\": {forward:?}, \"detect_all_ms\": {detect:?}}}");
     }
     Ok(())
 }
 
-/// Minimum and median CPU time of `runs` calls, ms.
-fn time<E>(runs: usize, mut call: impl FnMut() -> Result<(), E>) -> Result<(f64, f64), E> {
-    let mut times = Vec::new();
-    for _ in 0..runs {
+/// CPU time of each of `runs` calls, ms, after some to warm up.
+fn time<E>(runs: usize, mut call: impl FnMut() -> Result<(), E>) -> Result<Vec<f64>, E> {
+    (0..10).try_for_each(|_| call())?;
+    let once = |_| {
         let start = cpu_ms();
-        call()?;
-        times.push(cpu_ms() - start);
-    }
-    times.sort_by(f64::total_cmp);
-    Ok((times[0], times[times.len() / 2]))
+        call().map(|()| cpu_ms() - start)
+    };
+    (0..runs).map(once).collect()
 }
 
 fn cpu_ms() -> f64 {

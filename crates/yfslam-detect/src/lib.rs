@@ -24,6 +24,7 @@ mod decode;
 mod error;
 mod graph;
 mod kernels;
+mod memory;
 mod onnx;
 mod places;
 mod plan;

@@ -2,7 +2,8 @@
 //! the second-level cache.
 
 use crate::graph::{Network, Plane};
-use crate::kernels::matmul::WIDEST;
+use crate::kernels::WIDEST;
+use crate::kernels::depthwise::ROWS;
 
 /// Hands out memory in the order of execution.
 #[derive(Debug)]
@@ -44,11 +45,6 @@ impl<'n> Places<'n> {
         (0..planes.len() + padding).map(|index| start + index * stride).collect()
     }
 
-    /// Memory that is used at `time` only.
-    pub(crate) fn scratch(&mut self, floats: usize, time: usize) -> usize {
-        self.block(floats.next_multiple_of(WIDEST), time, time)
-    }
-
     /// Offsets of planes placed before.
     pub(crate) fn offsets(&self, planes: &[Plane]) -> Vec<usize> {
         planes.iter().map(|plane| self.offsets[*plane]).collect()
@@ -75,10 +71,10 @@ impl<'n> Places<'n> {
     }
 }
 
-/// Floats from one plane to the next: room for vectors that reach past the last row, and an odd number of cache lines, so that
-/// equal positions of neighbouring planes fall into different sets of the cache.
-fn stride((height, width): (usize, usize)) -> usize {
+/// Floats from one plane to the next: room for vectors that reach past the last row and for rows written in blocks, and an odd
+/// number of cache lines, so that equal positions of neighbouring planes fall into different sets of the cache.
+pub(crate) fn stride((height, width): (usize, usize)) -> usize {
     let whole = (height * width).next_multiple_of(WIDEST);
-    let rows = height.saturating_sub(1) * width + width.next_multiple_of(WIDEST);
+    let rows = (height.max(ROWS) - 1) * width + width.next_multiple_of(WIDEST);
     (whole.max(rows).div_ceil(WIDEST) | 1) * WIDEST
 }

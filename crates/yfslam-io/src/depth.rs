@@ -1,6 +1,6 @@
 //! Depth values of a recording: their spread, and whether the depth factor can be right.
 //!
-//! A wrong factor is the most common mistake with RGB-D recordings, and nothing downstream notices: the trajectory comes out whole, in
+//! A wrong factor is a common mistake, and nothing downstream notices it: the trajectory comes out whole, in
 //! the wrong scale, and every threshold in metres misses.
 
 use std::ops::RangeInclusive;

@@ -8,6 +8,24 @@
 //!
 //! An [`Error`] ends what was asked for: it names the file, the value and the cure. A [`FrameError`] concerns one frame; the
 //! caller counts it and goes on.
+//!
+//! ```no_run
+//! use yfslam_io::{FrameStream, Result, Sequence, SequenceOptions, check_recording, detect_camera, stream};
+//!
+//! fn play(folder: &std::path::Path) -> Result<()> {
+//!     let sequence = Sequence::open(folder, &SequenceOptions::default())?;
+//!     let camera = detect_camera(folder)?.camera;
+//!     check_recording(&sequence, &camera)?;
+//!     let mut skipped = 0;
+//!     for frame in FrameStream::open(&sequence, &camera, stream::DEFAULT_LOOK_AHEAD)? {
+//!         match frame {
+//!             Ok(frame) => println!("{} ns: {} px wide", frame.timestamp_ns, frame.color.width()),
+//!             Err(error) => skipped += 1,
+//!         }
+//!     }
+//!     Ok(())
+//! }
+//! ```
 
 mod ascending;
 pub mod camera;

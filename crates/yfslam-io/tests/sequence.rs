@@ -7,6 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use common::{real_data, write_sequence};
+use proptest::prelude::*;
 use yfslam_io::{Sequence, SequenceOptions};
 
 fn refusal(folder: &Path) -> String {
@@ -167,5 +168,47 @@ fn association_of_the_development_recordings_equals_their_published_pairs() {
         let stamps =
             |s: &Sequence| s.entries.iter().map(|e| (e.timestamp_ns, e.depth_timestamp_ns)).collect::<Vec<_>>();
         assert_eq!(stamps(&ours), stamps(&published), "{name}");
+    }
+}
+
+/// A list of one or two images a line, now and then with a line of anything.
+fn list_text(images_a_line: usize) -> impl Strategy<Value = String> {
+    let stamp = "[0-9]{1,2}|-?[0-9]{8,9}\\.[0-9]{1,9}";
+    let image = (stamp, "(rgb/0|depth/0|rgb/1|x)\\.png").prop_map(|(stamp, file)| format!("{stamp} {file}"));
+    let line = prop::collection::vec(image, images_a_line).prop_map(|images| images.join(" "));
+    let lines = prop::collection::vec(prop_oneof![40 => line, 1 => ".{0,20}"], 0..12);
+    lines.prop_map(|lines| lines.join("\n"))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(200) })]
+    #[test]
+    fn a_folder_of_arbitrary_lists_never_panics_and_every_image_is_accounted_for(
+        (rgb, depth, associations) in (list_text(1), list_text(1), list_text(2)),
+        with_associations: bool,
+        reverse: bool,
+        tolerance in prop_oneof![0..1i64 << 34, 0..=i64::MAX],
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        write_sequence(folder.path(), 1);
+        fs::write(folder.path().join("rgb.txt"), rgb).unwrap();
+        fs::write(folder.path().join("depth.txt"), depth).unwrap();
+        if with_associations {
+            fs::write(folder.path().join("associations.txt"), associations).unwrap();
+        }
+        let options = SequenceOptions { association_tolerance_ns: tolerance, reverse, ..Default::default() };
+        if let Ok(sequence) = Sequence::open(folder.path(), &options) {
+            prop_assert!(sequence.entries.windows(2).all(|w| w[0].timestamp_ns < w[1].timestamp_ns));
+            let report = &sequence.report;
+            prop_assert_eq!(report.paired, sequence.entries.len());
+            let skipped = report.duplicates_skipped + report.backward_skipped;
+            let unmatched = report.color_unmatched + report.depth_unmatched;
+            let accounted = match report.from_associations_file {
+                true => 2 * (report.paired + skipped),
+                false => 2 * report.paired + skipped + unmatched,
+            };
+            prop_assert_eq!(report.color_listed + report.depth_listed, accounted);
+            let _ = sequence.info();
+        }
     }
 }

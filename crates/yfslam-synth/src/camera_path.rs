@@ -163,7 +163,7 @@ fn keys(motion: CameraMotion, rng: &mut Rng) -> Vec<Key> {
             CameraMotion::Halfsphere => {
                 // Azimuth to the right, elevation up (a negative turn about the camera's x axis).
                 for (azimuth, elevation) in
-                    [(0.7, 0.0), (0.45, -0.5), (0.0, -0.75), (-0.5, -0.45), (-0.75, 0.05), (-0.3, 0.2), (0.0, -0.35)]
+                    [(0.7, 0.0), (0.5, -0.3), (0.0, -0.5), (-0.5, -0.3), (-0.75, 0.05), (-0.3, 0.2), (0.1, -0.2)]
                 {
                     keys.push(Key::new(near(azimuth), near(elevation), 0.0));
                 }

@@ -59,8 +59,8 @@ pub struct WorldConfig {
     pub activity: Activity,
     /// Number of people, 0 to 6.
     pub people: usize,
-    /// Mean share of the picture that walking people cover, 0 to 0.6. Their way is led nearer to or farther from the
-    /// camera to meet it; [`World::person_share`](crate::World::person_share) tells what was reached.
+    /// Mean share of the picture that walking people cover, 0 to 0.6. They walk nearer to the camera and linger before it
+    /// to meet it as well as they can; [`World::person_share`](crate::World::person_share) tells what was reached.
     pub person_share: f64,
     /// Number of frames.
     pub frames: usize,
@@ -134,7 +134,7 @@ pub struct LightConfig {
 
 impl Default for LightConfig {
     fn default() -> Self {
-        Self { shadow_rays: 12, moving_shadows: true, exposure: 1.0 }
+        Self { shadow_rays: 8, moving_shadows: true, exposure: 1.0 }
     }
 }
 

@@ -36,4 +36,4 @@ pub use config::{
     Activity, CameraMotion, LightConfig, MAX_PEOPLE, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera,
 };
 pub use spec::{is_spec, names, parse};
-pub use world::{SynthFrame, World};
+pub use world::{CLASS_NAMES, SynthFrame, World};

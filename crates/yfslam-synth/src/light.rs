@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use crate::bvh::Bvh;
 use crate::mesh::{Lighting, Mesh, Vec3};
-use crate::rng::Rng;
 
 /// A rectangular lamp (or window) that shines from its front.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +36,8 @@ pub struct Lights {
 pub struct LightMap {
     width: usize,
     height: usize,
-    values: Vec<[f32; 3]>,
+    /// Linear RGB; the fourth lane is unused.
+    values: Vec<[f32; 4]>,
 }
 
 /// A sphere of a moving body that shades its surroundings.
@@ -50,60 +50,67 @@ pub struct Occluder {
 }
 
 /// Distance between light-map samples on large surfaces, m.
-const SPACING_M: f32 = 0.09;
+const SPACING_M: f32 = 0.11;
 /// Beyond this distance a hit does not dim ambient light any more, m.
 const AMBIENT_REACH_M: f32 = 1.5;
+/// Share of ambient light that still comes from a surface nearby.
+const BOUNCED: f32 = 0.35;
+/// Keeps light finite at the lamp itself, m².
+const SOFTENING_M2: f32 = 0.05;
 /// Lifts ray origins off their own surface, m.
 const OFFSET_M: f32 = 2e-3;
 
 impl Lights {
     /// Irradiance at a point. `hidden(origin, direction, distance)` tells whether something is in the way; `samples`
-    /// is the number of rays per lamp and twice as many for the ambient term.
+    /// is the number of rays per lamp and twice as many for the ambient term. All points use the same sample pattern:
+    /// what error remains is smooth over a surface instead of mottled.
     fn irradiance(
         &self,
         point: &Vec3,
         normal: &Vec3,
         samples: usize,
-        rng: &mut Rng,
         hidden: &impl Fn(&Vec3, &Vec3, f32) -> bool,
-    ) -> [f32; 3] {
+    ) -> [f32; 4] {
         let origin = point + normal * OFFSET_M;
-        let mut sum = [0.0; 3];
+        let mut sum = [0.0; 4];
         for lamp in &self.lamps {
-            for _ in 0..samples {
-                let (a, b) = (rng.range(-1.0, 1.0), rng.range(-1.0, 1.0));
-                let to = lamp.center + lamp.half[0] * a + lamp.half[1] * b - origin;
+            let area = 4.0 * lamp.half[0].norm() * lamp.half[1].norm();
+            for [a, b] in (0..samples).map(scattered) {
+                let to = lamp.center + lamp.half[0] * (2.0 * a - 1.0) + lamp.half[1] * (2.0 * b - 1.0) - origin;
                 let distance = to.norm();
                 let direction = to / distance;
-                let cosines = normal.dot(&direction) * -lamp.normal.dot(&direction);
-                if normal.dot(&direction) > 0.0 && cosines > 0.0 && !hidden(&origin, &direction, distance - 0.02) {
-                    let area = 4.0 * lamp.half[0].norm() * lamp.half[1].norm();
-                    let gain = cosines * area / (distance * distance + 0.05) / samples as f32;
+                let (facing, leaving) = (normal.dot(&direction), -lamp.normal.dot(&direction));
+                if facing > 0.0 && leaving > 0.0 && !hidden(&origin, &direction, distance - 0.02) {
+                    let gain = facing * leaving * area / (distance * distance + SOFTENING_M2) / samples as f32;
                     (0..3).for_each(|k| sum[k] += lamp.radiance[k] * gain);
                 }
             }
         }
         let rays = 2 * samples;
-        let mut open = 0.0;
-        for i in 0..rays {
-            let direction = hemisphere(normal, (i as f32 + rng.range(0.0, 1.0)) / rays as f32, rng.range(0.0, 1.0));
-            open += if hidden(&origin, &direction, AMBIENT_REACH_M) { 0.35 } else { 1.0 };
-        }
-        let up = 0.5 + 0.5 * normal.z;
-        let open = if rays == 0 { 1.0 } else { open / rays as f32 };
-        (0..3).for_each(|k| sum[k] += open * (self.ambient[0][k] * up + self.ambient[1][k] * (1.0 - up)));
+        let open = (0..rays)
+            .map(scattered)
+            .map(|[s, t]| if hidden(&origin, &hemisphere(normal, s, t), AMBIENT_REACH_M) { BOUNCED } else { 1.0 });
+        let open = if rays == 0 { 1.0 } else { open.sum::<f32>() / rays as f32 };
+        let ambient = self.ambient_light(normal);
+        (0..3).for_each(|k| sum[k] += open * ambient[k]);
         sum
     }
 
+    /// Light from all around, by how far up a surface looks.
+    fn ambient_light(&self, normal: &Vec3) -> [f32; 3] {
+        let up = 0.5 + 0.5 * normal.z;
+        std::array::from_fn(|k| self.ambient[0][k] * up + self.ambient[1][k] * (1.0 - up))
+    }
+
     /// Bakes the light maps of every patch of `mesh` and makes the patches use them.
-    pub fn bake(&self, mesh: &mut Mesh, samples: usize, seed: u64) -> Vec<LightMap> {
+    pub fn bake(&self, mesh: &mut Mesh, samples: usize) -> Vec<LightMap> {
         let bvh = Bvh::new(mesh);
         let first = first_triangles(mesh);
         let maps: Vec<Option<LightMap>> = (0..mesh.patches.len())
             .into_par_iter()
             .map(|patch| {
                 let baked = matches!(mesh.patches[patch].lighting, Lighting::Baked(_));
-                baked.then(|| self.bake_patch(mesh, &bvh, &first, patch, samples, seed))
+                baked.then(|| self.bake_patch(mesh, &bvh, &first, patch, samples))
             })
             .collect();
         let mut out = Vec::new();
@@ -116,12 +123,11 @@ impl Lights {
         out
     }
 
-    fn bake_patch(&self, mesh: &Mesh, bvh: &Bvh, first: &[usize], patch: usize, samples: usize, seed: u64) -> LightMap {
+    fn bake_patch(&self, mesh: &Mesh, bvh: &Bvh, first: &[usize], patch: usize, samples: usize) -> LightMap {
         let triangles = &mesh.triangles[first[patch]..first[patch + 1]];
         let [w, h] = extent(mesh, triangles);
         let cells = |metres: f32| ((metres / SPACING_M).ceil() as usize).clamp(2, 96);
         let (width, height) = (cells(w), cells(h));
-        let mut rng = Rng::new(seed, patch as u64);
         let hidden = |o: &Vec3, d: &Vec3, far: f32| bvh.hit(o, d, far);
         let values = (0..width * height)
             .map(|i| {
@@ -130,8 +136,8 @@ impl Lights {
                 let inset = |k: usize, n: usize| (k as f32 / (n - 1) as f32).clamp(0.02, 0.98);
                 let uv = [inset(i % width, width), inset(i / width, height)];
                 match locate(mesh, triangles, uv) {
-                    Some((point, normal)) => self.irradiance(&point, &normal, samples, &mut rng, &hidden),
-                    None => [0.0; 3],
+                    Some((point, normal)) => self.irradiance(&point, &normal, samples, &hidden),
+                    None => [0.0; 4],
                 }
             })
             .collect();
@@ -148,16 +154,18 @@ impl Lights {
             // A large lamp lights a little around the corner.
             let facing = (normal.dot(&direction) * 0.8 + 0.2).max(0.0) * (-lamp.normal.dot(&direction)).max(0.0);
             let area = 4.0 * lamp.half[0].norm() * lamp.half[1].norm();
-            (0..3).for_each(|k| sum[k] += lamp.radiance[k] * facing * area / (distance2 + 0.05));
+            let gain = facing * area / (distance2 + SOFTENING_M2);
+            (0..3).for_each(|k| sum[k] += lamp.radiance[k] * gain);
         }
-        let up = 0.5 + 0.5 * normal.z;
-        std::array::from_fn(|k| sum[k] + 0.9 * (self.ambient[0][k] * up + self.ambient[1][k] * (1.0 - up)))
+        let ambient = self.ambient_light(normal);
+        std::array::from_fn(|k| sum[k] + 0.9 * ambient[k])
     }
 }
 
 impl LightMap {
     /// Irradiance at (u, v), bilinear.
-    pub fn sample(&self, u: f32, v: f32) -> [f32; 3] {
+    #[inline]
+    pub fn sample(&self, u: f32, v: f32) -> [f32; 4] {
         let x = (u * (self.width - 1) as f32).clamp(0.0, (self.width - 1) as f32);
         let y = (v * (self.height - 1) as f32).clamp(0.0, (self.height - 1) as f32);
         let (x0, y0) = (x as usize, y as usize);
@@ -170,19 +178,31 @@ impl LightMap {
 }
 
 impl Occluder {
+    /// Distance from which the sphere does not matter, m: seven radii, where it would take 2 % of the light.
+    pub fn reach(&self) -> f32 {
+        7.0 * self.radius
+    }
+
     /// Share of light that the sphere leaves at a point with the given normal.
+    #[inline]
     pub fn visibility(&self, point: &Vec3, normal: &Vec3) -> f32 {
         let to = self.center - point;
         let distance2 = to.norm_squared();
-        // Beyond eight radii the sphere takes less than 1.6 % of the light.
-        if distance2 > 64.0 * self.radius * self.radius {
+        let fade = 1.0 - distance2 / (self.reach() * self.reach());
+        if fade <= 0.0 {
             return 1.0;
         }
         let cosine = normal.dot(&to) / distance2.sqrt().max(1e-6);
         let ratio = (self.radius * self.radius / distance2).min(1.0);
-        let fade = 1.0 - distance2 / (64.0 * self.radius * self.radius);
         1.0 - 0.8 * cosine.max(0.0) * ratio * fade
     }
+}
+
+/// Point number `i` of a sequence that fills [0, 1]² evenly: the additive recurrence of the plastic number (Roberts,
+/// "The unreasonable effectiveness of quasirandom sequences", 2018).
+fn scattered(i: usize) -> [f32; 2] {
+    let n = i as f32 + 0.5;
+    [(n * 0.754_877_7).fract(), (n * 0.569_840_3).fract()]
 }
 
 /// Cosine-weighted direction around `normal` (Malley's method).

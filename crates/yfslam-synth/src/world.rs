@@ -6,20 +6,24 @@
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
+use rayon::prelude::*;
 use yfslam::image::Image;
 use yfslam::{BoundingBox, Camera, Detection, RgbdFrame};
 
 use crate::camera_path::CameraPath;
-use crate::config::{WorldConfig, WorldError};
-use crate::light::{LightMap, Occluder};
+use crate::config::{WorldConfig, WorldError, default_camera};
+use crate::light::{LightMap, Lights, Occluder};
 use crate::people::People;
 use crate::render::rays::RayTable;
 use crate::render::shade::View;
-use crate::render::{self, Picture};
+use crate::render::{self, Backdrop, Picture};
 use crate::rng::hash;
 use crate::scene::Scene;
 use crate::sensor;
 use crate::texture::Texture;
+
+/// Names of the classes of [`SynthFrame`]'s detections, by [`Detection::class`].
+pub const CLASS_NAMES: [&str; 1] = ["person"];
 
 /// A synthetic sequence, ready to render.
 #[derive(Debug)]
@@ -57,10 +61,12 @@ impl World {
     pub fn new(config: &WorldConfig) -> Result<Self, WorldError> {
         config.validate()?;
         let mut scene = Scene::new(config.scene, config.seed);
-        let people = People::new(&mut scene, config.activity, config.people, config.seed);
-        let textures = scene.palette.paint();
+        let people = People::new(&mut scene, config);
+        // Textures for the default focal length suit any other when they have as many more or fewer texels.
+        let sharpness = config.camera.fx.max(config.camera.fy) / default_camera().fx;
+        let textures = scene.palette.paint(sharpness.clamp(0.05, 3.0) as f32);
         let lights = scene.lights.clone();
-        let light_maps = lights.bake(&mut scene.mesh, config.light.shadow_rays, config.seed);
+        let light_maps = lights.bake(&mut scene.mesh, config.light.shadow_rays);
         let path = CameraPath::new(config.motion, scene.camera, config.hand_shake, config.seed);
         let rays = RayTable::new(&config.camera);
         let config = config.clone();
@@ -175,49 +181,54 @@ impl World {
             .collect()
     }
 
-    /// Bisects how near people walk, so that they cover the wanted share of the picture.
+    /// Searches how near people walk, so that they cover the wanted share of the picture.
     fn choose_distance(&mut self) {
-        if self.people.anyone_walks() {
-            let (mut near, mut far) = (1.0, 0.0);
-            for _ in 0..6 {
-                let middle = 0.5 * (near + far);
-                self.people.set_closeness(&self.scene, self.config.seed, middle);
-                if self.estimate_share() < self.config.person_share { far = middle } else { near = middle }
-            }
-            self.people.set_closeness(&self.scene, self.config.seed, 0.5 * (near + far));
-        }
-        self.person_share = self.estimate_share();
-    }
-
-    fn estimate_share(&self) -> f64 {
         const FRAMES: usize = 24;
-        let scale = 16.0_f64.max(self.config.camera.width as f64 / 40.0);
-        let small = shrink(&self.config.camera, scale);
-        let rays = RayTable::new(&small);
+        const WIDTH: usize = 48;
+        let rays = RayTable::new(&shrink(&self.config.camera, WIDTH));
         let count = FRAMES.min(self.len());
-        let shares = (0..count).map(|k| {
-            let index = k * self.len() / count;
-            let (people, _) = self.people.at(self.seconds(index), &self.scene.lights);
-            let t_cam_world = self.pose(index).inverse();
-            let view = View {
-                meshes: [&self.scene.mesh, &people],
-                textures: &self.textures,
-                light_maps: &self.light_maps,
-                occluders: &[],
-                r_cam_world: t_cam_world.rotation.cast(),
-                pitch: rays.pitch,
-            };
-            render::actor_share(&rays, &t_cam_world, &view)
-        });
-        shares.sum::<f64>() / count as f64
+        let times: Vec<f64> = (0..count).map(|k| self.seconds(k * self.len() / count)).collect();
+        let backdrops: Vec<Backdrop> =
+            times.iter().map(|&t| Backdrop::new(&rays, self.path.pose(t).inverse(), &self.scene.mesh)).collect();
+        // Light does not matter for the share.
+        let dark = Lights::default();
+        let share = |people: &People| {
+            let shares = times.par_iter().zip(&backdrops).map(|(&t, b)| b.share(&rays, &people.at(t, &dark).0));
+            // Summed in order: a parallel sum would depend on the threads.
+            shares.collect::<Vec<f64>>().iter().sum::<f64>() / count as f64
+        };
+        if !self.people.anyone_walks() {
+            self.person_share = share(&self.people);
+            return;
+        }
+        let mut try_out = |closeness: f64| {
+            self.people.set_closeness(&self.scene, &self.config, closeness);
+            let reached = share(&self.people);
+            ((reached - self.config.person_share).abs(), closeness, reached)
+        };
+        let mut best = try_out(-1.0);
+        let mut step = 0.25;
+        for k in -3..=4 {
+            let tried = try_out(f64::from(k) * step);
+            best = if tried.0 < best.0 { tried } else { best };
+        }
+        for _ in 0..4 {
+            step /= 2.0;
+            for closeness in [best.1 - step, best.1 + step] {
+                let tried = try_out(closeness.min(1.0));
+                best = if tried.0 < best.0 { tried } else { best };
+            }
+        }
+        (_, _, self.person_share) = try_out(best.1);
     }
 }
 
-/// The same view with fewer pixels.
-fn shrink(camera: &Camera, scale: f64) -> Camera {
+/// The same view in an image of the given width.
+fn shrink(camera: &Camera, width: usize) -> Camera {
+    let scale = camera.width as f64 / width as f64;
     Camera {
-        width: ((camera.width as f64 / scale) as usize).max(8),
-        height: ((camera.height as f64 / scale) as usize).max(8),
+        width,
+        height: ((camera.height as f64 / scale).round() as usize).max(1),
         fx: camera.fx / scale,
         fy: camera.fy / scale,
         cx: (camera.cx + 0.5) / scale - 0.5,

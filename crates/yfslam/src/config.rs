@@ -154,8 +154,10 @@ config_section! {
         min_inliers: usize = 15,
         /// Observation weight that makes a landmark count for the reference (a sight with depth weighs 2). Source: ORB-SLAM2.
         min_observation_weight: usize = 3,
-        /// Frames between keyframes at least; 0 leaves it to the other rules. Source: ORB-SLAM2 with an idle mapper.
-        min_frames: u64 = 0,
+        /// Frames between keyframes at least, unless it is urgent: the time that ORB-SLAM2's mapper is busy with one.
+        min_frames: u64 = 5,
+        /// Share of the reference keyframe's landmarks below which a keyframe is urgent. Source: ORB-SLAM2.
+        urgent_ratio: f64 = 0.25,
     }
 }
 
@@ -226,6 +228,8 @@ config_section! {
         edge_px: f32 = 6.0,
         /// Features that must stay trusted; else the least certain boxes are given up.
         min_trusted: usize = 60,
+        /// Features asked for at most, as a multiple of `features.count`, to make up for those on moving bodies. NGD-SLAM asks for 1.5.
+        max_extra_features: f64 = 2.5,
         /// Seed of the random draws.
         seed: u64 = 0,
     }

@@ -210,11 +210,22 @@ impl Slam {
     /// Features of the frame with depth, undistorted.
     fn extract(&mut self, frame: &RgbdFrame) {
         gray_from_rgb(&frame.color, &mut self.gray);
+        self.extractor.set_count(self.features_wanted());
         self.extractor.extract(&self.gray, &mut self.extracted);
         self.tracker.begin_frame(frame.timestamp_ns);
         let current = &mut self.tracker.current;
         current.features.fill(&self.extracted, &frame.depth, &self.sensor.camera, self.sensor.bounds);
         current.clear_sights();
+    }
+
+    /// Features to ask for, so that about `features.count` are left when those on moving bodies are dropped: the share dropped in the
+    /// last frame is expected again.
+    fn features_wanted(&self) -> usize {
+        let count = self.config.features.count as f64;
+        let last = &self.tracker.current.features.features;
+        let trusted = last.iter().filter(|f| f.trust > 0.0).count().max(1);
+        let factor = (last.len() as f64 / trusted as f64).clamp(1.0, self.config.dynamic.max_extra_features);
+        (count * factor) as usize
     }
 
     /// Whether the first frame has the features, and the depths, that a map needs.

@@ -3,6 +3,8 @@
 //! A *plane* is one channel of one activation, `height × width` floats. A layer reads any list of planes and writes new
 //! ones, so concatenation, channel split and channel shuffle are list operations at load time and cost nothing per frame.
 
+mod channels;
+mod compute;
 mod fold;
 mod lower;
 mod view;

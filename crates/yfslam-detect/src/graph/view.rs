@@ -23,9 +23,9 @@ impl View {
         Self { dims: vec![1, planes.len(), size.0, size.1], inner: 2, size, planes }
     }
 
-    /// Whether this is one image of shape `[1, channels, height, width]`.
+    /// Whether this is one image of shape `[1, channels, height, width]` with at least one channel.
     pub(crate) fn is_image(&self) -> bool {
-        self.inner == 2 && self.dims.len() == 4 && self.dims[0] == 1
+        self.inner == 2 && self.dims.len() == 4 && self.dims[0] == 1 && !self.planes.is_empty()
     }
 
     fn leading(&self) -> &[usize] {
@@ -33,7 +33,7 @@ impl View {
     }
 
     /// A possibly negative axis as an index into the leading dimensions.
-    fn leading_axis(&self, axis: i64) -> Result<usize, String> {
+    pub(crate) fn leading_axis(&self, axis: i64) -> Result<usize, String> {
         let absolute = if axis < 0 { axis + self.dims.len() as i64 } else { axis };
         usize::try_from(absolute)
             .ok()

@@ -5,11 +5,10 @@
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 
+use super::{WIDEST, load};
+
 /// Output channels computed together.
 pub(crate) const BLOCK: usize = 6;
-
-/// Widest vector in floats; rows are processed to the next multiple of it and must have that much room.
-pub(crate) const WIDEST: usize = 16;
 
 /// A weight matrix in the order in which the kernel reads it, padded with zero rows to a multiple of [`BLOCK`].
 #[derive(Debug)]
@@ -54,11 +53,13 @@ pub(crate) struct Rows<'a> {
     pub(crate) outputs: &'a [usize],
     /// Added to the product before ReLU, one per padded row, or empty.
     pub(crate) addend: &'a [usize],
-    /// Floats per row.
+    /// Whether a result that is less than what its place holds is dropped.
+    pub(crate) keep_larger: bool,
+    /// Floats per row; all are processed up to the next multiple of [`WIDEST`].
     pub(crate) length: usize,
 }
 
-/// `outputs = relu(weights · inputs + bias + addend)`.
+/// `outputs = relu(weights · inputs + bias + addend)`, or the larger of that and what `outputs` held.
 pub(crate) fn multiply(level: Level, memory: &mut [f32], matrix: &Matrix, rows: Rows) {
     dispatch!(level, simd => multiply_simd(simd, memory, matrix, rows));
 }
@@ -88,18 +89,24 @@ fn blocks<S: Simd, const V: usize>(simd: S, memory: &mut [f32], matrix: &Matrix,
     let blocks = matrix.weights.chunks_exact(matrix.depth).zip(&matrix.bias).zip(rows.outputs.as_chunks::<BLOCK>().0);
     for (block, ((weights, bias), outputs)) in blocks.enumerate() {
         let sums = product::<S, V>(simd, memory, weights, bias, rows.inputs, column);
-        for (row, (sums, output)) in sums.into_iter().zip(outputs).enumerate() {
-            for (vector, mut sum) in sums.into_iter().enumerate() {
+        for (row, (sums, output)) in sums.iter().zip(outputs).enumerate() {
+            for (vector, sum) in sums.iter().enumerate() {
                 let at = column + vector * S::f32s::LEN;
+                let mut sum = *sum;
                 if let Some(addend) = rows.addend.get(block * BLOCK + row) {
                     sum += load(simd, memory, addend + at);
                 }
-                sum.max(floor).store_slice(&mut memory[output + at..][..S::f32s::LEN]);
+                let place = &mut memory[output + at..][..S::f32s::LEN];
+                if rows.keep_larger {
+                    sum = sum.max(S::f32s::from_slice(simd, place));
+                }
+                sum.max(floor).store_slice(place);
             }
         }
     }
 }
 
+/// Array methods that take closures are not always inlined here, and then they cost more than the product: hence the loops.
 #[inline(always)]
 fn product<S: Simd, const V: usize>(
     simd: S,
@@ -109,10 +116,16 @@ fn product<S: Simd, const V: usize>(
     inputs: &[usize],
     column: usize,
 ) -> [[S::f32s; V]; BLOCK] {
-    let mut sums: [[S::f32s; V]; BLOCK] = bias.map(|bias| [S::f32s::splat(simd, bias); V]);
+    let mut sums = [[S::f32s::splat(simd, 0.0); V]; BLOCK];
+    for (sums, bias) in sums.iter_mut().zip(bias) {
+        *sums = [S::f32s::splat(simd, *bias); V];
+    }
     for (weights, input) in weights.iter().zip(inputs) {
         let row = &memory[input + column..][..V * S::f32s::LEN];
-        let values: [S::f32s; V] = std::array::from_fn(|vector| load(simd, row, vector * S::f32s::LEN));
+        let mut values = [sums[0][0]; V];
+        for (value, row) in values.iter_mut().zip(row.chunks_exact(S::f32s::LEN)) {
+            *value = S::f32s::from_slice(simd, row);
+        }
         for (sums, weight) in sums.iter_mut().zip(weights) {
             let weight = S::f32s::splat(simd, *weight);
             for (sum, value) in sums.iter_mut().zip(values) {
@@ -123,8 +136,42 @@ fn product<S: Simd, const V: usize>(
     sums
 }
 
-/// One vector from `memory` at `offset`.
-#[inline(always)]
-pub(crate) fn load<S: Simd>(simd: S, memory: &[f32], offset: usize) -> S::f32s {
-    S::f32s::from_slice(simd, &memory[offset..][..S::f32s::LEN])
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kernels::testing::{Arena, assert_close, levels, noise};
+
+    proptest! {
+        #[test]
+        fn equals_the_sum_of_products(
+            (count, depth, length) in (1..30_usize, 1..40_usize, 1..150_usize),
+            (relu, adds, keep_larger) in any::<(bool, bool, bool)>(),
+            seed in any::<u32>(),
+        ) {
+            let (weights, bias) = (noise(count * depth, seed), noise(count, seed ^ 1));
+            let matrix = Matrix::pack(&weights, &bias, relu);
+            let padded = matrix.padded_rows();
+            let size = (1, length);
+            for level in levels() {
+                let (mut arena, offsets) = Arena::new(&[(depth, size), (padded, size), (padded, size)], seed);
+                let [inputs, addend, outputs] = &offsets[..] else { unreachable!() };
+                let before = arena.memory.clone();
+                let addend = if adds { &addend[..] } else { &[] };
+                multiply(level, &mut arena.memory, &matrix, Rows { inputs, outputs, addend, keep_larger, length });
+                arena.assert_untouched(&before, outputs);
+                for row in 0..count {
+                    let expected: Vec<f64> = (0..length).map(|column| {
+                        let product = |k: usize| f64::from(weights[row * depth + k]) * f64::from(before[inputs[k] + column]);
+                        let added = if adds { f64::from(before[addend[row] + column]) } else { 0.0 };
+                        let sum = (0..depth).map(product).sum::<f64>() + f64::from(bias[row]) + added;
+                        let least = if keep_larger { f64::from(before[outputs[row] + column]) } else { f64::NEG_INFINITY };
+                        sum.max(least).max(if relu { 0.0 } else { f64::NEG_INFINITY })
+                    }).collect();
+                    assert_close(arena.plane(outputs[row]), &expected, &format!("{level:?}"));
+                }
+            }
+        }
+    }
 }

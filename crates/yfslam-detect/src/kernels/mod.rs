@@ -1,13 +1,23 @@
 //! The vector kernels, written once over `fearless_simd` and compiled for each instruction set.
 //!
-//! All work on one slice of floats, the network's memory, at offsets fixed when the model is loaded.
+//! All work on one slice of floats, the network's memory, at offsets fixed when the model is loaded. They are generic over the
+//! instruction set, and everything they call must be inlined; array methods that take closures are not, hence plain loops.
 
 pub(crate) mod depthwise;
 pub(crate) mod matmul;
 pub(crate) mod stem;
 pub(crate) mod upsample;
 
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd, SimdBase};
+
+/// The widest vector, floats. Whoever lays out memory leaves that much room for vectors that reach past the end of a row.
+pub(crate) const WIDEST: usize = 16;
+
+/// One vector from `memory` at `offset`.
+#[inline(always)]
+fn load<S: Simd>(simd: S, memory: &[f32], offset: usize) -> S::f32s {
+    S::f32s::from_slice(simd, &memory[offset..][..S::f32s::LEN])
+}
 
 /// The instruction sets that can be chosen on this machine, slowest first, the best one last.
 pub fn available_levels() -> Vec<Level> {
@@ -24,4 +34,78 @@ pub fn available_levels() -> Vec<Level> {
         levels.push(best);
     }
     levels
+}
+
+#[cfg(test)]
+mod testing {
+    //! Planes with random contents, placed as the network places them, to compare kernels with plain loops.
+
+    use fearless_simd::Level;
+
+    use super::WIDEST;
+    use crate::places::stride;
+
+    /// What lies behind the planes and must stay.
+    const SENTINEL: f32 = 12345.0;
+
+    /// Every level, the scalar one included.
+    pub(crate) fn levels() -> Vec<Level> {
+        [vec![Level::fallback()], super::available_levels()].concat()
+    }
+
+    /// Values in [−1, 1) that differ for each `seed`.
+    pub(crate) fn noise(count: usize, seed: u32) -> Vec<f32> {
+        let mut state = seed.wrapping_mul(2_654_435_761) | 1;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    /// Memory with groups of planes, each filled with noise to its last bit of room, and a sentinel behind.
+    pub(crate) struct Arena {
+        pub(crate) memory: Vec<f32>,
+        planes: Vec<(usize, (usize, usize))>,
+        end: usize,
+    }
+
+    impl Arena {
+        pub(crate) fn new(groups: &[(usize, (usize, usize))], seed: u32) -> (Self, Vec<Vec<usize>>) {
+            let (mut planes, mut end, mut offsets) = (Vec::new(), 0, Vec::new());
+            for (count, size) in groups {
+                offsets.push((0..*count).map(|index| end + index * stride(*size)).collect::<Vec<usize>>());
+                planes.extend(offsets.last().into_iter().flatten().map(|offset| (*offset, *size)));
+                end += count * stride(*size);
+            }
+            let mut memory = noise(end, seed);
+            memory.resize(end + 8 * WIDEST, SENTINEL);
+            (Self { memory, planes, end }, offsets)
+        }
+
+        pub(crate) fn plane(&self, offset: usize) -> &[f32] {
+            let (_, (height, width)) =
+                self.planes.iter().find(|(start, _)| *start == offset).expect("a plane starts here");
+            &self.memory[offset..][..height * width]
+        }
+
+        /// Fails if a plane other than `written` differs from `before`, or the sentinel does.
+        pub(crate) fn assert_untouched(&self, before: &[f32], written: &[usize]) {
+            assert!(self.memory[self.end..].iter().all(|value| *value == SENTINEL), "written behind the last plane");
+            for (offset, (height, width)) in self.planes.iter().filter(|(offset, _)| !written.contains(offset)) {
+                let range = *offset..offset + height * width;
+                assert_eq!(self.memory[range.clone()], before[range], "the plane at {offset} was overwritten");
+            }
+        }
+    }
+
+    pub(crate) fn assert_close(values: &[f32], expected: &[f64], what: &str) {
+        assert_eq!(values.len(), expected.len());
+        for (index, (value, expected)) in values.iter().zip(expected).enumerate() {
+            assert!(
+                (f64::from(*value) - expected).abs() < 1e-4,
+                "{what}, element {index}: {value} instead of {expected}"
+            );
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
-use super::matmul::load;
+use super::load;
 
 /// Writes each input plane of `height × width` twice as large; offsets into memory.
 pub(crate) fn double(level: Level, memory: &mut [f32], size: (usize, usize), inputs: &[usize], outputs: &[usize]) {
@@ -27,10 +27,39 @@ fn double_simd<S: Simd>(
                         let values = load(simd, memory, input + y / 2 * width + x);
                         let to = output + y * 2 * width + 2 * x;
                         values.zip_low(values).store_slice(&mut memory[to..][..S::f32s::LEN]);
-                        values.zip_high(values).store_slice(&mut memory[to + S::f32s::LEN..][..S::f32s::LEN]);
+                        if 2 * x + S::f32s::LEN < 2 * width {
+                            values.zip_high(values).store_slice(&mut memory[to + S::f32s::LEN..][..S::f32s::LEN]);
+                        }
                     }
                 }
             }
         },
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kernels::testing::{Arena, levels};
+
+    proptest! {
+        #[test]
+        fn every_value_becomes_a_square((height, width) in (1..30_usize, 1..40_usize), seed in any::<u32>()) {
+            for level in levels() {
+                let large = (2 * height, 2 * width);
+                let (mut arena, offsets) = Arena::new(&[(2, (height, width)), (2, large), (1, (9, 9))], seed);
+                let before = arena.memory.clone();
+                double(level, &mut arena.memory, (height, width), &offsets[0], &offsets[1]);
+                arena.assert_untouched(&before, &offsets[1]);
+                for (input, output) in offsets[0].iter().zip(&offsets[1]) {
+                    for (index, value) in arena.plane(*output).iter().enumerate() {
+                        let (y, x) = (index / large.1, index % large.1);
+                        prop_assert_eq!(*value, before[input + y / 2 * width + x / 2]);
+                    }
+                }
+            }
+        }
+    }
 }

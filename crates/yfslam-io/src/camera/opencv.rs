@@ -130,7 +130,8 @@ fn read_settings<'a>(text: &'a str, path: &Path) -> Result<Settings<'a>> {
         let indented = trimmed.len() < content.len();
         let name = if indented && !parent.is_empty() { format!("{parent}.{key}") } else { key.to_owned() };
         if !indented {
-            parent = key;
+            // What has a value of its own is no parent: indentation below it means nothing.
+            parent = if value.is_empty() || value.starts_with("!!") { key } else { "" };
         }
         if value.is_empty() {
             continue;

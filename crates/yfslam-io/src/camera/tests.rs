@@ -37,6 +37,7 @@ fn keys_of_orb_slam3_and_indented_keys_are_read() {
     .unwrap();
     assert_eq!((source.camera.fx, source.camera.width, source.camera.depth_factor), (500.0, 640, 1000.0));
     assert!((source.camera.bf - 40.0).abs() < 1e-9);
+    assert_eq!(settings(&SETTINGS.replace("Camera.cy", "  Camera.cy")).unwrap().camera.cy, 255.3);
 }
 
 #[test]

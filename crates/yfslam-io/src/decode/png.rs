@@ -43,11 +43,8 @@ pub fn decode_depth(bytes: &[u8], expected: Option<ImageSize>, into: &mut Image<
     let size = size_of(&reader);
     check_size(size, expected, DEPTH_SIZE_CURE)?;
     into.resize(size.width, size.height);
-    let mut pixels = vec![0; size.width * size.height * 2];
-    read_pixels(&mut reader, &mut pixels)?;
-    for (depth, pixel) in into.data_mut().iter_mut().zip(pixels.as_chunks().0) {
-        *depth = u16::from_be_bytes(*pixel);
-    }
+    read_pixels(&mut reader, bytemuck::cast_slice_mut(into.data_mut()))?;
+    into.data_mut().iter_mut().for_each(|depth| *depth = u16::from_be(*depth));
     Ok(())
 }
 

@@ -9,7 +9,7 @@ use crate::light::Lights;
 use crate::mesh::{Lighting, Mesh, Patch, Vec3};
 use crate::rng::Rng;
 use crate::scene::builder::Palette;
-use crate::texture::material::Material;
+use crate::texture::material::{Material, Pattern};
 
 const SKINS: [[f32; 3]; 4] = [[0.86, 0.68, 0.56], [0.78, 0.58, 0.45], [0.60, 0.42, 0.31], [0.46, 0.31, 0.23]];
 const HAIRS: [[f32; 3]; 4] = [[0.16, 0.12, 0.10], [0.34, 0.22, 0.14], [0.60, 0.46, 0.28], [0.24, 0.23, 0.23]];
@@ -22,6 +22,8 @@ const SHIRTS: [[[f32; 3]; 2]; 6] = [
     [[0.85, 0.66, 0.24], [0.26, 0.22, 0.30]],
 ];
 const TROUSERS: [[f32; 3]; 4] = [[0.22, 0.27, 0.38], [0.26, 0.24, 0.23], [0.56, 0.49, 0.39], [0.34, 0.38, 0.42]];
+
+const PATTERNS: [Pattern; 4] = [Pattern::Stripes, Pattern::Checks, Pattern::Motifs, Pattern::Print];
 
 /// A dressed body.
 #[derive(Clone, Debug)]
@@ -36,9 +38,10 @@ pub struct Body {
 impl Body {
     /// Person number `instance` (from 1); textures are ordered from `palette`.
     pub fn new(instance: u8, palette: &mut Palette, seed: u64) -> Self {
+        let style = Rng::new(seed, 0x57).below(12);
         let mut rng = Rng::new(seed, 0xb0d1 + u64::from(instance));
         let proportions = Proportions { height: rng.range(1.62, 1.86), girth: rng.range(0.92, 1.12) };
-        let mut tailor = Tailor { mesh: Mesh::default(), bones: Vec::new(), palette, rng, instance };
+        let mut tailor = Tailor { mesh: Mesh::default(), bones: Vec::new(), palette, rng, instance, style };
         tailor.dress(&proportions);
         Self { proportions, mesh: tailor.mesh, bones: tailor.bones }
     }
@@ -67,18 +70,20 @@ struct Tailor<'a> {
     palette: &'a mut Palette,
     rng: Rng,
     instance: u8,
+    /// Shifts the choice of shirts, by the seed.
+    style: usize,
 }
 
 impl Tailor<'_> {
     fn patch(&mut self, material: Material, size_m: [f32; 2], density: f32) -> Patch {
-        let texture = self.palette.order(material, size_m, density, self.rng.bits());
+        let texture = self.palette.order(material, size_m, density * material.detail(), self.rng.bits());
         Patch { texture, lighting: Lighting::Vertex, instance: self.instance }
     }
 
     /// A loft on `bone`, moved by `at` and tilted by `pitch` about the bone's x axis.
     fn part(&mut self, bone: Bone, at: Vec3, pitch: f32, rings: &[[f32; 3]], patch: Patch) {
         let first = self.mesh.vertices.len();
-        self.mesh.loft(20, &smooth(rings), patch);
+        self.mesh.loft(16, rings, patch);
         let pose = Isometry3::new(at, Vec3::x() * pitch);
         self.mesh.transform_from(first, &pose);
         self.bones.resize(self.mesh.vertices.len(), bone.index() as u8);
@@ -86,12 +91,14 @@ impl Tailor<'_> {
 
     fn dress(&mut self, p: &Proportions) {
         let (skin, hair) = (self.rng.pick(SKINS), self.rng.pick(HAIRS));
-        // The instance chooses the shirt, so that people in one picture differ.
-        let [shirt, accent] = SHIRTS[(usize::from(self.instance) + SHIRTS.len() - 1) % SHIRTS.len()];
+        // The number chooses the shirt, so that people in one picture differ.
+        let [shirt, accent] = SHIRTS[(usize::from(self.instance) + self.style) % SHIRTS.len()];
+        let pattern = PATTERNS[(usize::from(self.instance) + self.style) % PATTERNS.len()];
         let trousers = self.rng.pick(TROUSERS);
         let (s, g) = (p.height / 1.75, p.girth);
         let top = p.trunk() - 0.06 + 0.045 * s;
-        let shirt_material = Material::Shirt(shirt, accent);
+        let shirt_material = Material::Shirt(shirt, accent, pattern);
+        let sleeve = if pattern == Pattern::Print { Material::Cloth(shirt) } else { shirt_material };
         let patch = self.patch(shirt_material, [1.1, 0.68], 600.0);
         let trunk = [
             [top + 0.035 * s, 0.045, 0.045],
@@ -101,23 +108,25 @@ impl Tailor<'_> {
             [top - 0.11 * s, 0.186 * s * g, 0.120 * s * g],
             [top - 0.22 * s, 0.174 * s * g, 0.122 * s * g],
             [top - 0.36 * s, 0.158 * s * g, 0.110 * s * g],
-            [-0.06, 0.170 * s * g, 0.122 * s * g],
-            [-0.16, 0.180 * s * g, 0.132 * s * g],
-            [-0.165, 0.12, 0.09],
+            [-0.02, 0.172 * s * g, 0.124 * s * g],
+            [-0.10, 0.190 * s * g, 0.142 * s * g],
+            [-0.11, 0.184 * s * g, 0.136 * s * g],
+            [-0.10, 0.12, 0.09],
         ];
-        self.part(Bone::Chest, Vec3::zeros(), 0.0, &trunk, patch);
+        self.part(Bone::Chest, Vec3::zeros(), 0.0, &smooth(&trunk), patch);
         let patch = self.patch(Material::Cloth(trousers), [1.1, 0.3], 500.0);
         let hips = [
-            [0.10, 0.12, 0.08],
-            [0.08, 0.160 * s * g, 0.112 * s * g],
-            [-0.02, 0.172 * s * g, 0.124 * s * g],
+            [0.06, 0.12, 0.08],
+            [0.04, 0.145 * s * g, 0.102 * s * g],
+            [-0.03, 0.166 * s * g, 0.120 * s * g],
             [-0.10, 0.150 * s * g, 0.110 * s * g],
             [-0.15, 0.06, 0.06],
         ];
-        self.part(Bone::Pelvis, Vec3::zeros(), 0.0, &hips, patch);
+        self.part(Bone::Pelvis, Vec3::zeros(), 0.0, &smooth(&hips), patch);
         self.head(s, skin, hair);
+        let bare = self.rng.chance(0.5);
         for side in [0, 1] {
-            self.arm(p, side, s, shirt_material, skin);
+            self.arm(p, side, sleeve, bare, skin);
             self.leg(p, side, s, g, trousers);
         }
     }
@@ -141,13 +150,13 @@ impl Tailor<'_> {
         self.part(Bone::Head, Vec3::new(0.0, 0.108 * s, 0.118 * s), 0.0, &nose, patch);
     }
 
-    fn arm(&mut self, p: &Proportions, side: usize, s: f32, sleeve: Material, skin: [f32; 3]) {
+    fn arm(&mut self, p: &Proportions, side: usize, sleeve: Material, bare: bool, skin: [f32; 3]) {
+        let s = p.height / 1.75;
         let patch = self.patch(sleeve, [0.36, p.upper_arm() + 0.1], 500.0);
-        self.part(Bone::UpperArm(side), Vec3::zeros(), 0.0, &limb(0.0, 0.062 * s, 0.048 * s, p.upper_arm()), patch);
-        let bare = self.rng.chance(0.5);
+        self.part(Bone::UpperArm(side), Vec3::zeros(), 0.0, &limb(0.0, 0.062 * s, 0.051 * s, p.upper_arm()), patch);
         let material = if bare { Material::Plain(skin) } else { sleeve };
         let patch = self.patch(material, [0.28, p.forearm() + 0.08], 500.0);
-        self.part(Bone::Forearm(side), Vec3::zeros(), 0.0, &limb(0.0, 0.047 * s, 0.031 * s, p.forearm()), patch);
+        self.part(Bone::Forearm(side), Vec3::zeros(), 0.0, &limb(0.0, 0.043 * s, 0.030 * s, p.forearm()), patch);
         let patch = self.patch(Material::Plain(skin), [0.2, 0.18], 400.0);
         let hand = ellipsoid([0.022 * s, 0.042 * s, 0.085 * s]);
         self.part(Bone::Forearm(side), -Vec3::z() * (p.forearm() + 0.065 * s), 0.0, &hand, patch);
@@ -156,7 +165,7 @@ impl Tailor<'_> {
     fn leg(&mut self, p: &Proportions, side: usize, s: f32, g: f32, trousers: [f32; 3]) {
         let cloth = Material::Cloth(trousers);
         let patch = self.patch(cloth, [0.52, p.thigh() + 0.14], 500.0);
-        self.part(Bone::Thigh(side), Vec3::zeros(), 0.0, &limb(0.0, 0.088 * s * g, 0.062 * s, p.thigh()), patch);
+        self.part(Bone::Thigh(side), Vec3::zeros(), 0.0, &limb(0.0, 0.082 * s * g, 0.060 * s, p.thigh()), patch);
         let patch = self.patch(cloth, [0.40, p.shank() + 0.1], 500.0);
         let (r, l) = (s, p.shank());
         let calf = [
@@ -168,9 +177,9 @@ impl Tailor<'_> {
             [-0.97 * l, 0.056 * r, 0.058 * r],
             [-l, 0.030, 0.030],
         ];
-        self.part(Bone::Shank(side), Vec3::zeros(), 0.0, &calf, patch);
+        self.part(Bone::Shank(side), Vec3::zeros(), 0.0, &smooth(&calf), patch);
         let leather = self.rng.range(0.14, 0.5);
-        let patch = self.patch(Material::Shirt([leather; 3], [0.9, 0.9, 0.88]), [0.3, 0.28], 500.0);
+        let patch = self.patch(Material::Plain([leather, 0.9 * leather, 0.8 * leather]), [0.3, 0.28], 500.0);
         // The shoe's axis lies forward: the loft is tilted by a quarter turn.
         let a = p.ankle();
         let shoe = [
@@ -183,7 +192,7 @@ impl Tailor<'_> {
             [-0.19 * s, 0.0, 0.0],
         ];
         let at = Vec3::new(0.0, 0.015, -a + 0.042);
-        self.part(Bone::Foot(side), at, std::f32::consts::FRAC_PI_2, &shoe, patch);
+        self.part(Bone::Foot(side), at, std::f32::consts::FRAC_PI_2, &smooth(&shoe), patch);
     }
 }
 

@@ -18,8 +18,8 @@ pub fn stride(p: &Proportions) -> f32 {
     4.0 * (p.thigh() + p.shank()) * HIP_SWING.sin() * 0.95
 }
 
-/// Joints of someone who has walked `distance` metres and moves at `speed` m/s.
-pub fn walk(p: &Proportions, distance: f32, speed: f32) -> Joints {
+/// Joints of someone who has walked `distance` metres and moves at `speed` m/s; who halts, gestures.
+pub fn walk(p: &Proportions, distance: f32, speed: f32, seed: u64, time: f32) -> Joints {
     let effort = (speed / FULL_STRIDE_SPEED).clamp(0.0, 1.2);
     let phase = (distance / stride(p)).fract() * TAU;
     let mut j = Joints::default();
@@ -37,6 +37,7 @@ pub fn walk(p: &Proportions, distance: f32, speed: f32) -> Joints {
     let (sin, cos) = phase.sin_cos();
     j.pelvis = [0.10 * effort * cos, 0.04 * effort * sin];
     j.trunk = [0.03 + 0.05 * effort, -0.08 * effort * cos, 0.0];
+    gestures(&mut j, seed, time, 0.9 * (1.0 - effort.min(1.0)));
     j
 }
 

@@ -10,7 +10,6 @@ use crate::mesh::Vec3;
 
 /// Bones; sides are right, then left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
 pub enum Bone {
     Pelvis,
     Chest,
@@ -86,12 +85,12 @@ impl Proportions {
 
     /// Half the distance between the shoulders.
     pub fn half_shoulders(&self) -> f32 {
-        0.108 * self.height * (0.6 + 0.4 * self.girth)
+        0.093 * self.height * (0.6 + 0.4 * self.girth)
     }
 
     /// Half the distance between the hip joints.
     pub fn half_hips(&self) -> f32 {
-        0.050 * self.height
+        0.046 * self.height
     }
 }
 

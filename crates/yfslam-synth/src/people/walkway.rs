@@ -1,9 +1,7 @@
 //! The way someone walks: a closed smooth round with stops.
 //!
-//! In: way-points, a speed and a phase. Out: position, heading, distance walked and speed at any time. The round is a
+//! In: way-points, stops, a speed and a phase. Out: position, heading, distance walked and speed at any time. The round is a
 //! closed Catmull–Rom spline, walked by arc length; between stops the speed follows a minimum-jerk profile with a plateau.
-
-use crate::rng::Rng;
 
 /// A closed round.
 #[derive(Clone, Debug)]
@@ -13,6 +11,8 @@ pub struct Walkway {
     arc: Vec<f64>,
     legs: Vec<Leg>,
     period: f64,
+    /// Time in the round at the middle of the first stop, s.
+    visit: f64,
     phase: f64,
     clockwise: bool,
 }
@@ -29,6 +29,17 @@ struct Leg {
     pause: f64,
 }
 
+/// A place to stop at.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop {
+    /// The nearest point of the round is meant, m.
+    pub near: [f64; 2],
+    /// How long, s; more than 0.
+    pub pause: f64,
+    /// Where one turns meanwhile, relative to the direction of the way, rad.
+    pub glance: f64,
+}
+
 /// Where a walker is.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
@@ -36,7 +47,7 @@ pub struct Step {
     pub position: [f64; 2],
     /// Direction of the body: angle about +z from +y, rad.
     pub heading: f64,
-    /// Distance walked since the start of the round, m.
+    /// Distance walked along the way, counted from somewhere, m.
     pub distance: f64,
     /// Speed, m/s.
     pub speed: f64,
@@ -45,8 +56,8 @@ pub struct Step {
 const SAMPLES_PER_SPAN: usize = 24;
 
 impl Walkway {
-    /// A round through `waypoints` at about `speed` m/s, `phase` (0 to 1) of a round ahead, with stops drawn from `rng`.
-    pub fn new(waypoints: &[[f64; 2]], speed: f64, phase: f64, clockwise: bool, rng: &mut Rng) -> Self {
+    /// A round through `waypoints` at about `speed` m/s with at least one stop.
+    pub fn new(waypoints: &[[f64; 2]], stops: &[Stop], speed: f64, clockwise: bool) -> Self {
         let n = waypoints.len() as isize;
         let at = |i: isize| waypoints[i.rem_euclid(n) as usize];
         let mut points = Vec::new();
@@ -62,23 +73,40 @@ impl Walkway {
             arc.push(arc[arc.len() - 1] + distance(pair[0], pair[1]));
         }
         let total = arc[arc.len() - 1];
-        // Three legs a round; the stops are somewhere in the middle of each third.
-        let stops = [0.15, 0.5, 0.83].map(|share| total * (share + rng.range64(-0.08, 0.08)));
+        let along = |stop: &Stop| {
+            let squared = |p: &[f64; 2]| distance(*p, stop.near);
+            let nearest = points.iter().enumerate().min_by(|(_, a), (_, b)| squared(a).total_cmp(&squared(b)));
+            let at = nearest.map_or(0.0, |(i, _)| arc[i]);
+            if clockwise { total - at } else { at }
+        };
+        let mut halts: Vec<(f64, usize)> = stops.iter().enumerate().map(|(i, stop)| (along(stop), i)).collect();
+        halts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut legs = Vec::new();
-        let mut time = 0.0;
-        for k in 0..stops.len() {
-            let length = (stops[(k + 1) % stops.len()] - stops[k]).rem_euclid(total);
-            // The smooth profile's mean speed is 1/(1 - RAMP) below its plateau.
+        let (mut time, mut visit) = (0.0, 0.0);
+        for (k, &(start_arc, _)) in halts.iter().enumerate() {
+            let (end_arc, index) = halts[(k + 1) % halts.len()];
+            let stop = stops[index];
+            // With one stop only, the leg is a full round.
+            let length = total - (start_arc - end_arc).rem_euclid(total);
+            // The smooth profile's mean speed is a share 1 - RAMP of its plateau.
             let walk_time = length / (speed * (1.0 - RAMP));
-            let (pause, glance) = (rng.range64(0.6, 2.2), rng.range64(-0.9, 0.9));
-            legs.push(Leg { start_time: time, walk_time, start_arc: stops[k], length, glance, pause });
-            time += walk_time + pause;
+            legs.push(Leg { start_time: time, walk_time, start_arc, length, glance: stop.glance, pause: stop.pause });
+            if index == 0 {
+                visit = time + walk_time + stop.pause / 2.0;
+            }
+            time += walk_time + stop.pause;
         }
-        Self { points, arc, legs, period: time, phase: phase * time, clockwise }
+        Self { points, arc, legs, period: time, visit, phase: 0.0, clockwise }
+    }
+
+    /// The same round, timed to be at the first stop at `time` seconds, and then ahead by `spread` rounds.
+    pub fn meeting(self, time: f64, spread: f64) -> Self {
+        Self { phase: self.visit - time + spread * self.period, ..self }
     }
 
     /// Where the walker is at `time` seconds.
     pub fn at(&self, time: f64) -> Step {
+        let rounds = ((time + self.phase) / self.period).floor();
         let t = (time + self.phase).rem_euclid(self.period);
         let k = self.legs.partition_point(|leg| leg.start_time <= t).saturating_sub(1);
         let leg = self.legs[k];
@@ -88,7 +116,8 @@ impl Walkway {
         let rest = ((t - leg.start_time - leg.walk_time) / leg.pause).clamp(0.0, 1.0);
         let glance = leg.glance * (std::f64::consts::PI * rest).sin().powi(2);
         let (position, heading) = self.locate(arc);
-        Step { position, heading: heading + glance, distance: arc, speed: rate * leg.length / leg.walk_time }
+        let distance = rounds * self.arc[self.arc.len() - 1] + arc;
+        Step { position, heading: heading + glance, distance, speed: rate * leg.length / leg.walk_time }
     }
 
     fn locate(&self, arc: f64) -> ([f64; 2], f64) {
@@ -148,7 +177,10 @@ mod tests {
     #[test]
     fn a_walker_moves_without_jumps_at_the_stated_speed_and_stops() {
         let round = [[2.0, 0.0], [0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]];
-        let walkway = Walkway::new(&round, 0.9, 0.3, true, &mut Rng::new(4, 0));
+        let stop = |near| Stop { near, pause: 1.5, glance: 0.8 };
+        let walkway = Walkway::new(&round, &[stop([0.0, 2.0]), stop([-2.0, 0.1])], 0.9, true).meeting(3.0, 0.0);
+        let met = walkway.at(3.0);
+        assert!(distance(met.position, [0.0, 2.0]) < 0.1 && met.speed < 1e-9, "{met:?}");
         let h = 0.01;
         let steps: Vec<Step> = (0..(2.0 * walkway.period / h) as usize).map(|i| walkway.at(i as f64 * h)).collect();
         let speeds: Vec<f64> = steps.windows(2).map(|pair| distance(pair[0].position, pair[1].position) / h).collect();
@@ -157,6 +189,8 @@ mod tests {
         assert!(speeds.iter().any(|&s| s < 1e-6), "never stops");
         for (pair, speed) in steps.windows(2).zip(&speeds) {
             assert!((pair[0].speed - speed).abs() < 0.05, "{} is not {speed}", pair[0].speed);
+            let walked = (pair[1].distance - pair[0].distance) / h;
+            assert!((walked - speed).abs() < 0.01, "the way counts {walked} m/s instead of {speed}");
             let turn = (pair[1].heading - pair[0].heading).sin().abs();
             assert!(turn < 0.06, "turns by {turn} rad in {h} s");
         }

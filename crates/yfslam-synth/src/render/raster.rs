@@ -21,72 +21,86 @@ pub struct Visibility {
     pub triangle: Vec<u32>,
 }
 
-/// Finds the nearest triangle of every pixel.
-pub fn rasterise(rays: &RayTable, triangles: &[Projected]) -> Visibility {
-    let mut inverse_depth = vec![0.0; rays.x.len()];
-    let mut triangle = vec![NOTHING; rays.x.len()];
-    let band = TILE * rays.stride;
-    inverse_depth.par_chunks_mut(band).zip(triangle.par_chunks_mut(band)).enumerate().for_each(
-        |(index, (depths, ids))| {
+impl Visibility {
+    /// Nothing seen yet.
+    pub fn empty(rays: &RayTable) -> Self {
+        Self { inverse_depth: vec![0.0; rays.x.len()], triangle: vec![NOTHING; rays.x.len()] }
+    }
+
+    /// Puts `triangles` before or behind what is seen already, pixel by pixel.
+    pub fn add(&mut self, rays: &RayTable, triangles: &[Projected]) {
+        let band = TILE * rays.stride;
+        let bands = self.inverse_depth.par_chunks_mut(band).zip(self.triangle.par_chunks_mut(band));
+        bands.enumerate().for_each(|(index, (depths, ids))| {
             let in_band: Vec<u32> = (0u32..)
                 .zip(triangles)
                 .filter(|(_, t)| t.bounds.overlaps(&rays.bands[index]))
                 .map(|(id, _)| id)
                 .collect();
-            let mut list = Vec::new();
+            let mut tile = Tile { rays, band: index, column: 0, list: Vec::new() };
             for column in 0..rays.stride / TILE {
-                let tile = &rays.tiles[index * (rays.stride / TILE) + column];
-                candidates(tile, triangles, &in_band, &mut list);
-                draw_tile(rays, index, column, tile, triangles, &list, depths, ids);
+                tile.column = column;
+                tile.find_candidates(triangles, &in_band);
+                tile.draw(triangles, depths, ids);
             }
-        },
-    );
-    Visibility { inverse_depth, triangle }
+        });
+    }
 }
 
 /// A triangle that may touch the tile, and the greatest inverse depth it can have there.
 type Candidate = (f32, u32);
 
-fn candidates(tile: &Rect, triangles: &[Projected], in_band: &[u32], list: &mut Vec<Candidate>) {
-    list.clear();
-    for &id in in_band {
-        let t = &triangles[id as usize];
-        if t.bounds.overlaps(tile) && t.edges.iter().all(|edge| tile.max_of(edge) >= 0.0) {
-            list.push((tile.max_of(&t.inverse_depth), id));
-        }
-    }
-    list.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-}
-
-#[allow(clippy::too_many_arguments)]
-fn draw_tile(
-    rays: &RayTable,
+/// A tile at work.
+struct Tile<'a> {
+    rays: &'a RayTable,
     band: usize,
     column: usize,
-    tile: &Rect,
-    triangles: &[Projected],
-    list: &[Candidate],
-    depths: &mut [f32],
-    ids: &mut [u32],
-) {
-    let across = rays.stride / TILE;
-    let (xs, ys) = (rays.x.as_chunks::<TILE>().0, rays.y.as_chunks::<TILE>().0);
-    let (depths, ids) = (depths.as_chunks_mut::<TILE>().0, ids.as_chunks_mut::<TILE>().0);
-    // Everything in the tile is at least this near once some triangle covers the whole tile.
-    let mut covered_from = 0.0;
-    for &(nearest, id) in list {
-        if nearest < covered_from {
-            break;
+    /// What may be seen, nearest first.
+    list: Vec<Candidate>,
+}
+
+impl Tile<'_> {
+    fn rect(&self) -> &Rect {
+        &self.rays.tiles[self.band * (self.rays.stride / TILE) + self.column]
+    }
+
+    fn find_candidates(&mut self, triangles: &[Projected], in_band: &[u32]) {
+        let rect = *self.rect();
+        self.list.clear();
+        for &id in in_band {
+            let t = &triangles[id as usize];
+            if t.bounds.overlaps(&rect) && t.edges.iter().all(|edge| rect.max_of(edge) >= 0.0) {
+                self.list.push((rect.max_of(&t.inverse_depth), id));
+            }
         }
-        let t = &triangles[id as usize];
-        let covers = t.edges.iter().all(|edge| tile.min_of(edge) >= 0.0);
-        if covers {
-            covered_from = tile.min_of(&t.inverse_depth).max(covered_from);
-        }
-        for row in 0..TILE {
-            let local = row * across + column;
-            let global = band * TILE * across + local;
-            draw_row(t, id, &xs[global], &ys[global], &mut depths[local], &mut ids[local]);
+        self.list.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    }
+
+    /// Draws the candidates into the rows of the band.
+    fn draw(&self, triangles: &[Projected], depths: &mut [f32], ids: &mut [u32]) {
+        let across = self.rays.stride / TILE;
+        let (xs, ys) = (self.rays.x.as_chunks::<TILE>().0, self.rays.y.as_chunks::<TILE>().0);
+        let (depths, ids) = (depths.as_chunks_mut::<TILE>().0, ids.as_chunks_mut::<TILE>().0);
+        let pitch = self.rays.pitch[1];
+        // Everything in the tile is at least this near once some triangle covers the whole tile.
+        let mut covered_from = 0.0;
+        for &(nearest, id) in &self.list {
+            if nearest < covered_from {
+                break;
+            }
+            let t = &triangles[id as usize];
+            if t.edges.iter().all(|edge| self.rect().min_of(edge) >= 0.0) {
+                covered_from = self.rect().min_of(&t.inverse_depth).max(covered_from);
+            }
+            for row in 0..TILE {
+                let local = row * across + self.column;
+                let global = self.band * TILE * across + local;
+                let ends = [ys[global][0], ys[global][TILE - 1]];
+                // A pixel of slack, as rows bend under distortion.
+                if ends[0].min(ends[1]) - pitch <= t.bounds.y[1] && ends[0].max(ends[1]) + pitch >= t.bounds.y[0] {
+                    draw_row(t, id, &xs[global], &ys[global], &mut depths[local], &mut ids[local]);
+                }
+            }
         }
     }
 }

@@ -33,7 +33,6 @@ type Plane = [f32; 3];
 pub struct Surface<'a> {
     texture: &'a Texture,
     light_map: Option<&'a LightMap>,
-    occluded: bool,
     inverse_depth: Plane,
     u: Plane,
     v: Plane,
@@ -76,7 +75,6 @@ impl<'a> View<'a> {
         Surface {
             texture: &self.textures[patch.texture as usize],
             light_map,
-            occluded: light_map.is_some() && !self.occluders.is_empty(),
             inverse_depth: t.inverse_depth,
             u: plane(v.map(|v| v.uv[0])),
             v: plane(v.map(|v| v.uv[1])),
@@ -85,8 +83,8 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Linear RGB where the ray (x, y, 1) meets the surface.
-    pub fn shade(&self, surface: &Surface, x: f32, y: f32) -> [f32; 3] {
+    /// Linear RGB where the ray (x, y, 1) meets the surface, shaded by those of the occluders that are `near`.
+    pub fn shade(&self, surface: &Surface, near: &[Occluder], x: f32, y: f32) -> [f32; 3] {
         let z = 1.0 / at(&surface.inverse_depth, x, y);
         let (u, v) = (at(&surface.u, x, y) * z, at(&surface.v, x, y) * z);
         let [w, h] = surface.texture.size();
@@ -112,11 +110,14 @@ impl<'a> View<'a> {
         };
         let light = match surface.light_map {
             Some(map) => map.sample(u, v),
-            None => surface.light.map(|plane| at(&plane, x, y) * z),
+            None => {
+                let [r, g, b] = surface.light.map(|plane| at(&plane, x, y) * z);
+                [r, g, b, 0.0]
+            }
         };
-        let shadow = if surface.occluded {
+        let shadow: f32 = if surface.light_map.is_some() {
             let point = Vec3::new(x * z, y * z, z);
-            self.occluders.iter().map(|o| o.visibility(&point, &surface.normal)).product()
+            near.iter().map(|o| o.visibility(&point, &surface.normal)).product()
         } else {
             1.0
         };

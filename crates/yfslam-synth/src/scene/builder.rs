@@ -32,9 +32,10 @@ impl Palette {
         (self.orders.len() - 1) as u32
     }
 
-    /// Paints everything that was ordered.
-    pub fn paint(&self) -> Vec<Texture> {
-        self.orders.par_iter().map(|o| Texture::new(&o.material.paint(o.size_m, o.density, o.seed))).collect()
+    /// Paints everything that was ordered, with `sharpness` times the texels per metre.
+    pub fn paint(&self, sharpness: f32) -> Vec<Texture> {
+        let paint = |o: &Order| Texture::new(&o.material.paint(o.size_m, o.density * sharpness, o.seed));
+        self.orders.par_iter().map(paint).collect()
     }
 }
 
@@ -77,7 +78,7 @@ impl Builder {
     /// A patch of the material for a surface of the given size.
     pub fn patch(&mut self, material: Material, size_m: [f32; 2]) -> Patch {
         let seed = self.rng.bits();
-        let texture = self.palette.order(material, size_m, self.density, seed);
+        let texture = self.palette.order(material, size_m, self.density * material.detail(), seed);
         Patch { texture, lighting: Lighting::Baked(0), instance: 0 }
     }
 
@@ -106,10 +107,13 @@ impl Builder {
             (Side::Top, Vec3::new(-h.x, h.y, h.z), dx, -dy),
             (Side::Bottom, Vec3::new(-h.x, -h.y, 0.0), dx, dy),
         ] {
-            // The underside of what lies on the floor is never seen.
+            // The underside of what lies on the floor is never seen, and the camera hardly gets behind things.
+            let density = self.density;
+            self.density = if matches!(side, Side::Back | Side::Bottom) { 0.4 * density } else { density };
             if side != Side::Bottom || base.z > 0.01 {
                 self.rectangle(corner, right, down, material(side));
             }
+            self.density = density;
         }
         self.mesh.transform_from(first, &upright(base, yaw));
     }

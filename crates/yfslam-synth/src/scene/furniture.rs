@@ -1,8 +1,10 @@
 //! Furniture and clutter.
 
+use nalgebra::{Isometry3, UnitQuaternion};
+
 use super::builder::{Builder, Side};
 use crate::mesh::Vec3;
-use crate::texture::material::{Material, tint};
+use crate::texture::material::{Material, Pattern, tint};
 use crate::texture::print::ink;
 
 const STEEL: [f32; 3] = [0.52, 0.54, 0.57];
@@ -119,24 +121,29 @@ pub fn mug(b: &mut Builder, base: Vec3) {
     let color = ink(&mut b.rng);
     b.density = 900.0;
     let rings = [[0.085, 0.0], [0.085, 0.034], [0.095, 0.036], [0.095, 0.042], [0.0, 0.038]];
-    b.turned(base, &rings, 18, Material::Shirt(color, [0.92, 0.92, 0.90]));
+    b.turned(base, &rings, 18, Material::Shirt(color, [0.92, 0.92, 0.90], Pattern::Stripes));
 }
 
-/// A potted plant made of leafy balls.
+/// A potted plant: long leaves that rise from the pot and bend outwards.
 pub fn plant(b: &mut Builder, base: Vec3) {
     b.density = 400.0;
     b.turned(base, &[[0.34, 0.0], [0.34, 0.15], [0.36, 0.18], [0.0, 0.13]], 20, Material::Plain([0.66, 0.36, 0.24]));
-    b.turned(base + Vec3::z() * 0.3, &[[0.5, 0.02], [0.0, 0.025]], 8, Material::Wood([0.42, 0.32, 0.22]));
-    for _ in 0..9 {
-        let at = Vec3::new(b.rng.range(-0.22, 0.22), b.rng.range(-0.22, 0.22), b.rng.range(0.65, 1.25));
-        let r = b.rng.range(0.10, 0.19);
-        let rings: Vec<[f32; 2]> = (0..=6)
-            .map(|i| {
-                let (sin, cos) = (i as f32 * std::f32::consts::PI / 6.0).sin_cos();
-                [r * cos, if i == 0 || i == 6 { 0.0 } else { r * sin }]
-            })
-            .collect();
-        b.turned(base + at, &rings, 9, Material::Leaves);
+    for leaf in 0..22 {
+        let azimuth = leaf as f32 * 2.4 + b.rng.range(-0.3, 0.3);
+        let (tilt, length) = (b.rng.range(0.15, 0.95), b.rng.range(0.22, 0.42));
+        let out = Vec3::new(azimuth.cos(), azimuth.sin(), 0.0);
+        let stem = out * (0.35 * tilt.sin()) + Vec3::z() * (0.45 + 0.55 * tilt.cos() * b.rng.range(0.6, 1.0));
+        let rings: Vec<[f32; 3]> = [(1.0, 0.0), (0.7, 0.6), (0.3, 1.0), (-0.3, 0.9), (-0.8, 0.4), (-1.0, 0.0)]
+            .map(|(z, r)| [z * length / 2.0, 0.006 * r, 0.055 * r])
+            .to_vec();
+        let first = b.mesh.vertices.len();
+        let patch = b.patch(Material::Leaves, [0.2, length]);
+        b.mesh.loft(8, &rings, patch);
+        // The blade's thin side looks outwards and up.
+        let turn = UnitQuaternion::from_axis_angle(&Vec3::z_axis(), azimuth)
+            * UnitQuaternion::from_axis_angle(&Vec3::y_axis(), 0.4 + tilt);
+        b.mesh.transform_from(first, &Isometry3::from_parts((base + stem).into(), turn));
+        b.turned(base + Vec3::z() * 0.3 + out * 0.02, &[[0.3, 0.006], [0.0, 0.008]], 5, Material::Leaves);
     }
 }
 

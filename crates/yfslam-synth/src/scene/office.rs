@@ -26,19 +26,20 @@ pub fn build(seed: u64) -> Scene {
     desks(&mut b);
     surroundings(&mut b);
     let blue = [0.22, 0.30, 0.46];
-    let left = chair(&mut b, Vec3::new(-0.80, 0.12, 0.0), -0.5, blue);
-    let right = chair(&mut b, Vec3::new(0.85, 0.10, 0.0), 0.6, [0.35, 0.33, 0.32]);
-    let seats = vec![Seat { position: left, heading: -0.5 }, Seat { position: right, heading: 0.6 }];
+    let (left_heading, right_heading) = (-1.9, 1.7);
+    let left = chair(&mut b, Vec3::new(-0.88, 0.28, 0.0), left_heading, blue);
+    let right = chair(&mut b, Vec3::new(0.90, 0.26, 0.0), right_heading, [0.38, 0.36, 0.34]);
+    let seats = vec![Seat { position: left, heading: left_heading }, Seat { position: right, heading: right_heading }];
     let stand = |x: f32, y: f32, heading: f32| Seat { position: Vec3::new(x, y, 0.0), heading };
     Scene {
         mesh: b.mesh,
         palette: b.palette,
-        lights: Lights { lamps, ambient: [[0.34, 0.34, 0.36], [0.24, 0.22, 0.20]] },
+        lights: Lights { lamps, ambient: [[0.66, 0.66, 0.69], [0.48, 0.45, 0.41]] },
         camera: look_at(Point3::new(0.0, -1.75, 1.36), Point3::new(0.0, 1.2, 0.86)),
         walk_center: Point3::new(0.0, 0.9, 0.0),
-        walk_half_width: 2.15,
-        walk_far_y: 2.2,
-        walk_near_y: [-1.15, -0.35],
+        walk_half_width: 2.3,
+        walk_far_y: 2.3,
+        walk_near_y: [-1.1, -0.75],
         seats,
         stands: vec![stand(-1.75, 0.6, -2.0), stand(1.8, 0.7, 2.2), stand(-0.5, 2.1, PI), stand(0.7, 2.2, -2.6)],
     }
@@ -48,7 +49,7 @@ pub fn build(seed: u64) -> Scene {
 fn room(b: &mut Builder) -> Vec<Lamp> {
     let (dx, dy, dz) = (Vec3::x() * (EAST - WEST), Vec3::y() * (NORTH - SOUTH), Vec3::z() * HEIGHT);
     let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
-    b.density = 300.0;
+    b.density = 250.0;
     b.rectangle(corner(WEST, NORTH, 0.0), dx, -dy, Material::Floor([0.56, 0.60, 0.66]));
     b.density = 160.0;
     b.rectangle(corner(WEST, SOUTH, HEIGHT), dx, dy, Material::Ceiling);
@@ -68,7 +69,7 @@ fn room(b: &mut Builder) -> Vec<Lamp> {
         center: corner(EAST - 0.03, 0.6, 1.6),
         half: [Vec3::y() * 0.9, Vec3::z() * 0.6],
         normal: -Vec3::x(),
-        radiance: [0.50, 0.56, 0.66],
+        radiance: [1.00, 1.12, 1.30],
     };
     b.density = 250.0;
     b.glowing(corner(EAST - 0.02, 1.5, 2.2), -Vec3::y() * 1.8, -Vec3::z() * 1.2, Material::Outdoors, 1.1);
@@ -83,7 +84,7 @@ fn room(b: &mut Builder) -> Vec<Lamp> {
         let center = corner(x, y, HEIGHT - 0.03);
         let top_left = center - half[0] - half[1];
         b.glowing(top_left, half[0] * 2.0, half[1] * 2.0, Material::Plain([1.0, 0.98, 0.94]), 1.3);
-        lamps.push(Lamp { center, half, normal: -Vec3::z(), radiance: [1.20, 1.16, 1.08] });
+        lamps.push(Lamp { center, half, normal: -Vec3::z(), radiance: [2.7, 2.62, 2.46] });
     }
     lamps
 }
@@ -168,6 +169,6 @@ fn surroundings(b: &mut Builder) {
     }
     plant(b, Vec3::new(2.75, 0.35, 0.0));
     plant(b, Vec3::new(-1.1, 2.95, 0.0));
-    bin(b, Vec3::new(1.85, 1.35, 0.0));
-    bin(b, Vec3::new(-1.8, 1.2, 0.0));
+    bin(b, Vec3::new(2.85, 1.45, 0.0));
+    bin(b, Vec3::new(-0.25, 0.75, 0.0));
 }

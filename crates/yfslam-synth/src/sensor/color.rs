@@ -16,9 +16,7 @@ pub fn develop(linear: &[[f32; 3]], width: usize, height: usize, exposure: f32, 
                 true => normals4(hash(seed, (row * width + column) as u64)),
                 false => [0.0; 4],
             };
-            for k in 0..3 {
-                *pixel.get_mut(k).unwrap_or(&mut 0) = level(rgb[k] * exposure, sigma * noise[k]);
-            }
+            *pixel = std::array::from_fn(|k| level(rgb[k] * exposure, sigma * noise[k]));
         }
     });
     image

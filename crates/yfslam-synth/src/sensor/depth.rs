@@ -24,7 +24,8 @@ pub fn measure(exact: &[f32], camera: &Camera, sensor: &SensorConfig, seed: u64)
             let measured = disturb(z, bf, sensor, normals4(bits)[0]);
             if (sensor.min_depth_m..=sensor.max_depth_m).contains(&measured) {
                 // Depth beyond the sixteen bits is no depth.
-                let value = (f64::from(measured) * camera.depth_factor).round();
+                // Rounds half up; `round` is a library call on older processors.
+                let value = f64::from(measured) * camera.depth_factor + 0.5;
                 *unit = if value < 65_536.0 { value as u16 } else { 0 };
             }
         }
@@ -36,7 +37,7 @@ fn disturb(z: f32, bf: f32, sensor: &SensorConfig, normal: f32) -> f32 {
     let sigma = sensor.depth_noise_m + sensor.depth_noise_growth * (z - 0.4).max(0.0).powi(2);
     let noisy = (z + sigma * normal).max(1e-3);
     if sensor.disparity_step_px > 0.0 && bf > 0.0 {
-        let steps = (bf / noisy / sensor.disparity_step_px).round().max(1.0);
+        let steps = ((bf / noisy / sensor.disparity_step_px + 0.5) as u32).max(1) as f32;
         bf / (steps * sensor.disparity_step_px)
     } else {
         noisy

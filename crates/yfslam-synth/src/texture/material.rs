@@ -8,6 +8,19 @@ use super::noise::{cell, fractal};
 use super::{Color, print};
 use crate::rng::Rng;
 
+/// Patterns of clothes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pattern {
+    /// Horizontal stripes.
+    Stripes,
+    /// Crossing bands.
+    Checks,
+    /// Small squares in rows.
+    Motifs,
+    /// A word and a sign on chest and back.
+    Print,
+}
+
 /// A kind of surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Material {
@@ -43,8 +56,8 @@ pub enum Material {
     Outdoors,
     /// Woven cloth, plain.
     Cloth(Color),
-    /// Clothes with a pattern.
-    Shirt(Color, Color),
+    /// Clothes of two colours with a pattern.
+    Shirt(Color, Color, Pattern),
     /// A face and the hair around it.
     Head(Color, Color),
     /// Hair.
@@ -54,6 +67,15 @@ pub enum Material {
 }
 
 impl Material {
+    /// Density of texels that the material needs, relative to printed matter.
+    pub fn detail(&self) -> f32 {
+        match self {
+            Self::Plain(_) | Self::Pages | Self::Hair(_) => 0.4,
+            Self::Cloth(_) | Self::Leaves => 0.7,
+            _ => 1.0,
+        }
+    }
+
     /// Paints a surface of `size_m` metres with about `density` texels per metre.
     pub fn paint(&self, size_m: [f32; 2], density: f32, seed: u64) -> Canvas {
         let texels = |metres: f32| ((metres * density).round() as usize).clamp(4, 4096);
@@ -78,7 +100,7 @@ impl Material {
             Self::Whiteboard => print::whiteboard(&mut canvas, m, &mut rng),
             Self::Outdoors => print::outdoors(&mut canvas, seed, &mut rng),
             Self::Cloth(color) => cloth(&mut canvas, color, m, seed),
-            Self::Shirt(base, accent) => shirt(&mut canvas, base, accent, m, seed, &mut rng),
+            Self::Shirt(base, accent, pattern) => shirt(&mut canvas, [base, accent], pattern, m, seed),
             Self::Head(skin, hair) => head(&mut canvas, skin, hair, seed),
             Self::Hair(color) => hair_strands(&mut canvas, color, seed),
             Self::Leaves => leaves(&mut canvas, m, seed),
@@ -194,35 +216,37 @@ fn cloth(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
     });
 }
 
-fn shirt(canvas: &mut Canvas, base: Color, accent: Color, m: f32, seed: u64, rng: &mut Rng) {
+fn shirt(canvas: &mut Canvas, [base, accent]: [Color; 2], pattern: Pattern, m: f32, seed: u64) {
     let (width, height) = (canvas.width() as f32, canvas.height() as f32);
-    match rng.below(4) {
-        0 => {
-            let stripe = rng.range(0.025, 0.05);
-            canvas.shade(|_, y, _| if (y * m / stripe).fract() < 0.4 { accent } else { base });
-        }
-        1 => {
-            let check = rng.range(0.05, 0.09);
-            canvas.shade(|x, y, _| {
-                let on = |t: f32| u8::from((t * m / check).fract() < 0.45);
-                blend(base, accent, 0.5 * f32::from(on(x) + on(y)))
-            });
-        }
-        2 => {
+    let mut rng = Rng::new(seed, 0x51);
+    match pattern {
+        Pattern::Stripes => canvas.shade(|_, y, _| if (y * m / 0.045).fract() < 0.4 { accent } else { base }),
+        Pattern::Checks => canvas.shade(|x, y, _| {
+            let on = |t: f32| f32::from(u8::from((t * m / 0.07).fract() < 0.45));
+            let thin = |t: f32| (t * m / 0.07 + 0.28).fract() < 0.06;
+            let ground = blend(base, accent, 0.5 * (on(x) + on(y)));
+            if thin(x) || thin(y) { tint(ground, 0.5) } else { ground }
+        }),
+        Pattern::Motifs => canvas.shade(|x, y, _| {
+            let (row, cells) = ((y * m / 0.05).floor(), 0.05);
+            let (u, v) = ((x * m / cells + 0.5 * (row % 2.0)).fract(), (y * m / cells).fract());
+            let ring = (u - 0.5).abs().max((v - 0.5).abs());
+            if ring < 0.12 || (ring > 0.2 && ring < 0.28) { accent } else { base }
+        }),
+        Pattern::Print => {
             canvas.fill(base);
-            for _ in 0..60 {
-                let (x, y) = (rng.range(0.0, width), rng.range(0.0, height));
-                let (w, h) = (rng.range(0.02, 0.09) / m, rng.range(0.02, 0.09) / m);
-                canvas.rect(x, y, w, h, tint(accent, rng.range(0.6, 1.3)));
-            }
-        }
-        _ => {
-            canvas.fill(base);
-            // A print on chest (u = 1/4 is the front) and back.
+            // u = 1/4 is the chest, 3/4 the back.
             for front in [0.25, 0.75] {
                 let size = (0.10 / m).min(width * 0.16);
                 canvas.rect(width * front - size, height * 0.30, 2.0 * size, 1.6 * size, accent);
-                print::word(canvas, width * front - 0.85 * size, height * 0.30 + 0.2 * size, 1.7 * size, base, rng);
+                print::word(
+                    canvas,
+                    width * front - 0.85 * size,
+                    height * 0.30 + 0.2 * size,
+                    1.7 * size,
+                    base,
+                    &mut rng,
+                );
                 canvas.disc(width * front, height * 0.30 + 1.15 * size, 0.3 * size, base);
             }
         }

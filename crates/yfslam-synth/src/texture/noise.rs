@@ -9,12 +9,17 @@ fn lattice(seed: u64, x: i32, y: i32) -> f32 {
     (mix(seed ^ key.wrapping_mul(0x9e37_79b9_7f4a_7c15)) >> 40) as f32 / 16_777_216.0
 }
 
+/// Rounds down without the library call that `f32::floor` is on processors older than SSE4.1.
+fn floor(x: f32) -> i32 {
+    let towards_zero = x as i32;
+    towards_zero - i32::from((towards_zero as f32) > x)
+}
+
 /// Smooth value noise in [0, 1] with cells of size one.
 pub fn value(seed: u64, x: f32, y: f32) -> f32 {
-    let (x0, y0) = (x.floor(), y.floor());
     let fade = |t: f32| t * t * (3.0 - 2.0 * t);
-    let (fx, fy) = (fade(x - x0), fade(y - y0));
-    let (i, j) = (x0 as i32, y0 as i32);
+    let (i, j) = (floor(x), floor(y));
+    let (fx, fy) = (fade(x - i as f32), fade(y - j as f32));
     let top = lattice(seed, i, j) * (1.0 - fx) + lattice(seed, i + 1, j) * fx;
     let bottom = lattice(seed, i, j + 1) * (1.0 - fx) + lattice(seed, i + 1, j + 1) * fx;
     top * (1.0 - fy) + bottom * fy
@@ -34,5 +39,5 @@ pub fn fractal(seed: u64, x: f32, y: f32, octaves: u32) -> f32 {
 
 /// White noise per cell in [0, 1].
 pub fn cell(seed: u64, x: f32, y: f32) -> f32 {
-    lattice(seed, x.floor() as i32, y.floor() as i32)
+    lattice(seed, floor(x), floor(y))
 }

@@ -26,6 +26,10 @@ pub struct Track {
 pub struct Tracks {
     /// The tracks.
     pub list: Vec<Track>,
+    /// Overlap, track and detection of each pair that may belong together.
+    pairs: Vec<(f32, usize, usize)>,
+    track_taken: Vec<bool>,
+    detection_taken: Vec<bool>,
 }
 
 impl Tracks {
@@ -36,25 +40,28 @@ impl Tracks {
             track.bbox = shifted(&track.bbox, track.velocity);
         }
         // Pairs of track and detection by descending overlap; indices break ties.
-        let mut pairs: Vec<(f32, usize, usize)> = Vec::new();
+        self.pairs.clear();
         for (t, track) in self.list.iter().enumerate() {
             for (d, detection) in detections.iter().enumerate() {
                 let iou = track.bbox.iou(&detection.bbox);
                 if iou >= config.track_min_iou && detection.score >= config.keep_score {
-                    pairs.push((iou, t, d));
+                    self.pairs.push((iou, t, d));
                 }
             }
         }
-        pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        let (mut track_taken, mut taken) = (vec![false; self.list.len()], vec![false; detections.len()]);
-        for (_, t, d) in pairs {
-            if !track_taken[t] && !taken[d] {
-                track_taken[t] = true;
-                taken[d] = true;
+        self.pairs.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        self.track_taken.clear();
+        self.track_taken.resize(self.list.len(), false);
+        self.detection_taken.clear();
+        self.detection_taken.resize(detections.len(), false);
+        for &(_, t, d) in &self.pairs {
+            if !self.track_taken[t] && !self.detection_taken[d] {
+                self.track_taken[t] = true;
+                self.detection_taken[d] = true;
                 self.list[t].follow(&detections[d]);
             }
         }
-        for (detection, taken) in detections.iter().zip(taken) {
+        for (detection, taken) in detections.iter().zip(&self.detection_taken) {
             if !taken && detection.score >= config.open_score {
                 self.list.push(Track {
                     bbox: detection.bbox,

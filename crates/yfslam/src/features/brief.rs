@@ -5,6 +5,8 @@
 
 use std::f32::consts::TAU;
 
+use fearless_simd::{Level, dispatch, prelude::*, u8x64};
+
 use super::fast::Corner;
 use super::pattern::TEST_PAIRS;
 use super::{Descriptor, PATCH_RADIUS};
@@ -19,8 +21,17 @@ const ROW: usize = 32;
 /// Bytes of the copied patch.
 const PATCH: usize = (2 * PATCH_RADIUS + 2) * ROW;
 
-/// Positions in the patch of the first and the second point of each test pair.
-type Pattern = [[u16; 2]; 256];
+/// Positions in the patch of 64 points.
+#[derive(Clone, Debug)]
+struct Points {
+    position: [u16; 64],
+    /// The same, split into a block of 128 bytes and the byte therein.
+    block: [u8; 64],
+    in_block: [u8; 64],
+}
+
+/// First and second points of the test pairs, 64 pairs for each word of the descriptor.
+type Pattern = [[Points; 2]; 4];
 
 /// Computes descriptors; holds the pattern in all orientations.
 #[derive(Clone, Debug)]
@@ -34,7 +45,26 @@ impl Describer {
     }
 
     /// Appends the descriptor of each corner; bit `i` says that the first point of pair `i` is darker than the second.
-    pub fn describe(&self, blurred: &Plane, corners: &[Corner], angles: &[f32], out: &mut Vec<Descriptor>) {
+    pub fn describe(
+        &self,
+        level: Level,
+        blurred: &Plane,
+        corners: &[Corner],
+        angles: &[f32],
+        out: &mut Vec<Descriptor>,
+    ) {
+        dispatch!(level, simd => self.describe_all(simd, blurred, corners, angles, out));
+    }
+
+    #[inline(always)]
+    fn describe_all<S: Simd>(
+        &self,
+        simd: S,
+        blurred: &Plane,
+        corners: &[Corner],
+        angles: &[f32],
+        out: &mut Vec<Descriptor>,
+    ) {
         let mut patch = [0u8; PATCH];
         for (corner, angle_rad) in corners.iter().zip(angles) {
             let start =
@@ -44,29 +74,131 @@ impl Describer {
                 row.copy_from_slice(&source[..ROW]);
             }
             let bin = (angle_rad * (BINS as f32 / TAU) + 0.5) as usize % BINS;
-            out.push(compare(&patch, &self.patterns[bin]));
+            let pattern = &self.patterns[bin];
+            // A vector as wide as that finds bytes faster than memory does.
+            out.push(if S::u8s::LEN == 64 {
+                compare_wide(simd, &patch, pattern)
+            } else {
+                compare(simd, &patch, pattern)
+            });
         }
     }
 }
 
-fn compare(patch: &[u8; PATCH], pattern: &Pattern) -> Descriptor {
-    let mut words = [0u64; 4];
-    for (word, pairs) in words.iter_mut().zip(pattern.chunks_exact(64)) {
-        for (bit, &[a, b]) in pairs.iter().enumerate() {
-            let [a, b] = [a, b].map(|position| patch[usize::from(position) % PATCH]);
-            *word |= u64::from(a < b) << bit;
+/// Fetches the points one by one, then compares them in vectors.
+#[inline(always)]
+fn compare<S: Simd>(simd: S, patch: &[u8; PATCH], pattern: &Pattern) -> Descriptor {
+    let mut words = [0; 4];
+    for (word, [first, second]) in words.iter_mut().zip(pattern) {
+        let (mut a, mut b) = ([0; 64], [0; 64]);
+        for i in 0..64 {
+            a[i] = patch[usize::from(first.position[i]) % PATCH];
+            b[i] = patch[usize::from(second.position[i]) % PATCH];
         }
+        *word = u8x64::from_slice(simd, &a).simd_lt(u8x64::from_slice(simd, &b)).to_bitmask();
     }
     Descriptor(words)
+}
+
+/// Looks 64 points up at a time, in a patch held by 16 vectors.
+#[inline(always)]
+fn compare_wide<S: Simd>(simd: S, patch: &[u8; PATCH], pattern: &Pattern) -> Descriptor {
+    let mut blocks = [[u8x64::splat(simd, 0); 2]; 8];
+    for i in 0..8 {
+        blocks[i][0] = u8x64::from_slice(simd, &patch[128 * i..128 * i + 64]);
+        blocks[i][1] = u8x64::from_slice(simd, &patch[128 * i + 64..128 * i + 128]);
+    }
+    let mut words = [0; 4];
+    for i in 0..4 {
+        let a = look_up(simd, &blocks, &pattern[i][0]);
+        let b = look_up(simd, &blocks, &pattern[i][1]);
+        words[i] = a.simd_lt(b).to_bitmask();
+    }
+    Descriptor(words)
+}
+
+#[inline(always)]
+fn look_up<S: Simd>(simd: S, blocks: &[[u8x64<S>; 2]; 8], points: &Points) -> u8x64<S> {
+    let index = u8x64::from_slice(simd, &points.in_block);
+    let block = u8x64::from_slice(simd, &points.block);
+    let mut found = u8x64::splat(simd, 0);
+    for (i, [low, high]) in blocks.iter().enumerate() {
+        found = block.simd_eq(i as u8).select(low.concat_swizzle_dyn(*high, index), found);
+    }
+    found
 }
 
 /// The test pairs rotated by `angle_rad`, rounded to pixels.
 fn rotated(angle_rad: f32) -> Pattern {
     let (sin, cos) = angle_rad.sin_cos();
-    let position = |u: i8, v: i8| {
+    let position = |[u, v]: [i8; 2]| {
         let (u, v) = (f32::from(u), f32::from(v));
         let [column, row] = [u * cos - v * sin, u * sin + v * cos].map(|d| (d.round() + PATCH_RADIUS as f32) as usize);
-        (row * ROW + column) as u16
+        row * ROW + column
     };
-    TEST_PAIRS.map(|[xa, ya, xb, yb]| [position(xa, ya), position(xb, yb)])
+    std::array::from_fn(|word| {
+        [0, 2].map(|first| {
+            let mut points = Points { position: [0; 64], block: [0; 64], in_block: [0; 64] };
+            for i in 0..64 {
+                let pair = TEST_PAIRS[64 * word + i];
+                let position = position([pair[first], pair[first + 1]]);
+                points.position[i] = position as u16;
+                points.block[i] = (position / 128) as u8;
+                points.in_block[i] = (position % 128) as u8;
+            }
+            points
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::image::GrayImage;
+    use crate::image::kernels::tests::levels;
+
+    const SIDE: usize = 2 * PATCH_RADIUS + 2;
+
+    /// A descriptor by its definition, at the orientation of a bin.
+    fn expected(patch: &GrayImage, bin: usize) -> Descriptor {
+        let (sin, cos) = (bin as f32 * TAU / BINS as f32).sin_cos();
+        let mut words = [0; 4];
+        for (i, pair) in TEST_PAIRS.iter().enumerate() {
+            let [xa, ya, xb, yb] = pair.map(f32::from);
+            let [a, b] = [(xa, ya), (xb, yb)].map(|(x, y)| {
+                let (column, row) = ((x * cos - y * sin).round() as isize, (x * sin + y * cos).round() as isize);
+                patch.row(PATCH_RADIUS.strict_add_signed(row))[PATCH_RADIUS.strict_add_signed(column)]
+            });
+            words[i / 64] |= u64::from(a < b) << (i % 64);
+        }
+        Descriptor(words)
+    }
+
+    proptest! {
+        #[test]
+        fn every_level_agrees_with_the_scalar_twin(
+            patch in proptest::collection::vec(any::<u8>(), SIDE * SIDE), bin in 0..BINS,
+        ) {
+            let patch = GrayImage::from_vec(SIDE, SIDE, patch).unwrap();
+            let corner = Corner { x: PATCH_RADIUS as u16, y: PATCH_RADIUS as u16, score: 0 };
+            for level in levels() {
+                let mut found = Vec::new();
+                let angle_rad = bin as f32 * TAU / BINS as f32;
+                Describer::new().describe(level, &Plane::from(&patch), &[corner], &[angle_rad], &mut found);
+                prop_assert_eq!(&found[..], &[expected(&patch, bin)], "{:?}", level);
+            }
+        }
+    }
+
+    #[test]
+    fn all_points_stay_in_the_patch_in_all_orientations() {
+        for points in Describer::new().patterns.iter().flatten().flatten() {
+            for position in points.position {
+                let (column, row) = (usize::from(position) % ROW, usize::from(position) / ROW);
+                assert!(column <= 2 * PATCH_RADIUS && row <= 2 * PATCH_RADIUS);
+            }
+        }
+    }
 }

@@ -104,15 +104,15 @@ fn score_row<S: Simd>(simd: S, image: &Plane, start: usize, len: usize, threshol
         let mut score = zero;
         if bright {
             let mut differences = circle(simd, &window);
-            for i in 0..16 {
-                differences[i] = differences[i].saturating_sub(centre);
+            for pixel in &mut differences {
+                *pixel = pixel.saturating_sub(centre);
             }
             score = best_arc::<S>(differences);
         }
         if dark {
             let mut differences = circle(simd, &window);
-            for i in 0..16 {
-                differences[i] = centre.saturating_sub(differences[i]);
+            for pixel in &mut differences {
+                *pixel = centre.saturating_sub(*pixel);
             }
             score = score.max(best_arc::<S>(differences));
         }

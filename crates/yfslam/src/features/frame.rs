@@ -119,7 +119,7 @@ impl FrameFeatures {
 
     /// Calls `visit` with the index of each feature within `radius` (px, maximum norm) of (u, v) whose octave lies in
     /// `octaves`.
-    #[inline]
+    #[inline(always)]
     pub fn for_each_near(
         &self,
         u: f32,

@@ -1,4 +1,42 @@
-//! Rotation consistency: matches between two images turn by the same angle (ORB-SLAM, IEEE T-RO 2015, section V-B).
+//! Comparing descriptors, and rotation consistency: matches between two images turn by the same angle (ORB-SLAM, IEEE T-RO 2015,
+//! section V-B).
+
+use fearless_simd::{Level, Simd, dispatch};
+
+use super::Descriptor;
+
+/// One of the descriptors compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Neighbor {
+    /// Its index among all descriptors.
+    pub index: u32,
+    /// Number of differing bits, 0–256.
+    pub distance: u32,
+}
+
+/// The nearest and the second nearest to `query` among `descriptors[i]` for all `i` in `candidates`.
+///
+/// Of equally near ones the earlier candidate comes first; indices out of range are passed over.
+pub fn two_nearest(query: &Descriptor, descriptors: &[Descriptor], candidates: &[u32]) -> [Option<Neighbor>; 2] {
+    // The baseline of x86-64 has no instruction that counts bits.
+    dispatch!(Level::new(), simd => search(simd, query, descriptors, candidates))
+}
+
+#[inline(always)]
+fn search<S: Simd>(_: S, query: &Descriptor, descriptors: &[Descriptor], candidates: &[u32]) -> [Option<Neighbor>; 2] {
+    let none = Neighbor { index: 0, distance: u32::MAX };
+    let (mut first, mut second) = (none, none);
+    for &index in candidates {
+        let Some(descriptor) = descriptors.get(index as usize) else { continue };
+        let distance = query.distance(descriptor);
+        if distance < first.distance {
+            (first, second) = (Neighbor { index, distance }, first);
+        } else if distance < second.distance {
+            second = Neighbor { index, distance };
+        }
+    }
+    [first, second].map(|neighbor| (neighbor.distance < u32::MAX).then_some(neighbor))
+}
 
 /// Bins of the histogram. Source: ORB-SLAM2.
 const BINS: usize = 30;
@@ -10,6 +48,11 @@ pub struct RotationHistogram {
 }
 
 impl RotationHistogram {
+    /// Forgets all matches.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+    }
+
     /// Notes that match `payload` turned by `turn_rad`, any angle.
     pub fn add(&mut self, turn_rad: f32, payload: u32) {
         let turns = turn_rad / std::f32::consts::TAU;
@@ -39,7 +82,28 @@ impl RotationHistogram {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    fn descriptors() -> impl Strategy<Value = Vec<Descriptor>> {
+        // Few bits set, so that equal distances occur.
+        proptest::collection::vec([0u64..4, 0u64..2, 0u64..2, 0u64..2].prop_map(Descriptor), 1..20)
+    }
+
+    proptest! {
+        #[test]
+        fn the_two_nearest_are_the_first_two_of_all_sorted(descriptors in descriptors(), candidates in proptest::collection::vec(0u32..25, 0..20)) {
+            let query = descriptors[0];
+            let mut all: Vec<Neighbor> = candidates
+                .iter()
+                .filter_map(|&index| Some(Neighbor { index, distance: query.distance(descriptors.get(index as usize)?) }))
+                .collect();
+            all.sort_by_key(|neighbor| neighbor.distance);
+            let expected = [all.first().copied(), all.get(1).copied()];
+            prop_assert_eq!(two_nearest(&query, &descriptors, &candidates), expected);
+        }
+    }
 
     #[test]
     fn matches_off_the_common_turn_are_outliers() {

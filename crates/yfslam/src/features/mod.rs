@@ -39,7 +39,7 @@ pub struct Descriptor(pub [u64; 4]);
 
 impl Descriptor {
     /// Number of differing bits, 0–256.
-    #[inline]
+    #[inline(always)]
     pub fn distance(&self, other: &Self) -> u32 {
         let (a, b) = (&self.0, &other.0);
         (a[0] ^ b[0]).count_ones()

@@ -72,6 +72,11 @@ impl OrbExtractor {
         &self.scale_factors
     }
 
+    /// Changes how many features the next images are asked for.
+    pub fn set_count(&mut self, count: usize) {
+        self.config.count = count;
+    }
+
     /// Replaces `out` by the features of `gray`; an image too small for a patch has none.
     pub fn extract(&mut self, gray: &GrayImage, out: &mut Features) {
         out.key_points.clear();
@@ -112,7 +117,7 @@ impl OrbExtractor {
             let (corners, scale) = (&corners.strong, self.scale_factors[octave]);
             orientations(self.level, image, corners, angles);
             blur(self.level, image, blurred, line);
-            self.describer.describe(blurred, corners, angles, &mut out.descriptors);
+            self.describer.describe(self.level, blurred, corners, angles, &mut out.descriptors);
             out.key_points.extend(corners.iter().zip(angles.iter()).map(|(corner, &angle_rad)| KeyPoint {
                 x: (f32::from(corner.x) + 0.5) * scale - 0.5,
                 y: (f32::from(corner.y) + 0.5) * scale - 0.5,

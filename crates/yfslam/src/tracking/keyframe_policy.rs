@@ -26,9 +26,6 @@ pub fn is_keyframe_wanted(
     frame: &TrackedFrame,
     summary: FrameSummary,
 ) -> bool {
-    if summary.frames_since < config.min_frames {
-        return false;
-    }
     let few = map.keyframe_count() <= 2;
     let min_weight = if few { config.min_observation_weight - 1 } else { config.min_observation_weight };
     let reference_landmarks = map.keyframe(reference).map_or(0, |k| {
@@ -43,6 +40,10 @@ pub fn is_keyframe_wanted(
     let need_close = close_tracked < config.close_tracked && close_untracked > config.close_untracked;
     let ratio = if map.keyframe_count() < 2 { config.first_reference_ratio } else { config.reference_ratio };
     let weak = (summary.inliers as f64) < reference_landmarks as f64 * ratio;
+    let urgent = (summary.inliers as f64) < reference_landmarks as f64 * config.urgent_ratio || need_close;
+    if summary.frames_since < config.min_frames && !urgent {
+        return false;
+    }
     let overdue = summary.frames_since as f64 >= summary.fps;
     let floor = config.min_inliers.max(tracking.local_min_inliers / 2);
     (weak || need_close || (overdue && summary.inliers < reference_landmarks)) && summary.inliers > floor

@@ -9,6 +9,7 @@ mod local_map;
 pub mod search;
 
 use crate::config::Config;
+use crate::features::matching::RotationHistogram;
 use crate::geometry::Pose;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::sensor::SensorModel;
@@ -39,6 +40,7 @@ pub struct Tracker {
     velocity: Option<Pose>,
     local_map: LocalMap,
     visible: Vec<LandmarkId>,
+    rotation: RotationHistogram,
     reference: Option<KeyFrameId>,
     frames_since_keyframe: u64,
     /// Landmarks that the current frame sees.
@@ -73,7 +75,8 @@ impl Tracker {
             self.current.clear_sights();
             self.current.t_cam_world = prediction;
             let radius = factor * c.motion_radius_px;
-            if search_last_frame(sensor, c, &self.last, &mut self.current, radius) >= c.motion_min_matches {
+            if search_last_frame(sensor, c, &self.last, &mut self.current, radius, &mut self.rotation)
+                >= c.motion_min_matches {
                 return self.current.refine_pose(sensor, &config.pose) >= c.motion_min_inliers;
             }
         }
@@ -87,7 +90,7 @@ impl Tracker {
         let Some(keyframe) = self.reference.and_then(|id| map.keyframe(id)) else { return false };
         self.current.clear_sights();
         self.current.t_cam_world = self.last.t_cam_world;
-        search_keyframe(c, keyframe, map, &mut self.current) >= c.reference_min_matches
+        search_keyframe(c, keyframe, map, &mut self.current, &mut self.rotation) >= c.reference_min_matches
             && self.current.refine_pose(sensor, &config.pose) >= c.motion_min_inliers
     }
 

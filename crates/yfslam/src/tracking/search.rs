@@ -1,12 +1,14 @@
 //! Matching by projection (ORB-SLAM, IEEE T-RO 2015, sections V-B and V-D).
 //!
-//! In: a frame with a predicted pose, and points with descriptors. Out: new entries in the frame's `sights`.
+//! In: a frame with a predicted pose, and points with descriptors. Out: new entries in the frame's `sights`. The inner loops are
+//! compiled for each instruction set: without one that counts bits, Hamming distances take most of their time.
 
+use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use crate::config::TrackingConfig;
 use crate::features::Descriptor;
-use crate::features::matching::RotationHistogram;
+use crate::features::matching::{RotationHistogram, two_nearest};
 use crate::map::{KeyFrame, LandmarkId, Map};
 use crate::sensor::SensorModel;
 use crate::tracking::frame::{Sight, TrackedFrame};
@@ -113,12 +115,28 @@ pub fn search_last_frame(
     last: &TrackedFrame,
     current: &mut TrackedFrame,
     radius_px: f32,
+    rotation: &mut RotationHistogram,
 ) -> usize {
+    rotation.clear();
+    dispatch!(Level::new(), simd => match_last_frame(simd, sensor, config, last, current, radius_px, rotation));
+    rotation.for_each_outlier(|j| current.sights[j as usize] = None);
+    current.matched()
+}
+
+#[inline(always)]
+fn match_last_frame<S: Simd>(
+    _: S,
+    sensor: &SensorModel,
+    config: &TrackingConfig,
+    last: &TrackedFrame,
+    current: &mut TrackedFrame,
+    radius_px: f32,
+    rotation: &mut RotationHistogram,
+) {
     let projector = Projector::new(sensor, &current.t_cam_world);
     let center_in_last = last.t_cam_world * projector.center_world;
     let baseline = sensor.pinhole.bf / sensor.pinhole.fx;
     let top = (sensor.levels() - 1) as u8;
-    let mut rotation = RotationHistogram::default();
     for (i, sight) in last.sights.iter().enumerate() {
         let Some(sight) = sight else { continue };
         let Some(projection) = projector.project(&sight.point_world) else { continue };
@@ -145,26 +163,28 @@ pub fn search_last_frame(
             rotation.add(seen.angle_rad - current.features.features[best.index].angle_rad, best.index as u32);
         }
     }
-    rotation.for_each_outlier(|j| current.sights[j as usize] = None);
-    current.matched()
 }
 
 /// Matches the landmarks of a keyframe by descriptor alone. Returns the number of matches.
-pub fn search_keyframe(config: &TrackingConfig, keyframe: &KeyFrame, map: &Map, current: &mut TrackedFrame) -> usize {
-    let mut rotation = RotationHistogram::default();
+pub fn search_keyframe(
+    config: &TrackingConfig,
+    keyframe: &KeyFrame,
+    map: &Map,
+    current: &mut TrackedFrame,
+    rotation: &mut RotationHistogram,
+) -> usize {
+    rotation.clear();
+    let candidates: Vec<u32> = (0..current.features.len()).filter(|&j| current.is_open(j)).map(|j| j as u32).collect();
     for (i, id) in keyframe.sights() {
         let Some(landmark) = map.landmark(id) else { continue };
-        let descriptor = &keyframe.features.descriptors[i];
-        let mut best = Best::none();
-        for (j, d) in current.features.descriptors.iter().enumerate() {
-            if current.is_open(j) {
-                best.offer(j, descriptor.distance(d), 0);
-            }
-        }
-        if best.is_distinct(config.hamming_low, config.reference_ratio) {
-            current.sights[best.index] = Some(Sight { landmark: Some(id), point_world: landmark.position });
-            let turn = keyframe.features.features[i].angle_rad - current.features.features[best.index].angle_rad;
-            rotation.add(turn, best.index as u32);
+        let [best, second] = two_nearest(&keyframe.features.descriptors[i], &current.features.descriptors, &candidates);
+        let Some(best) = best else { continue };
+        let rival = second.map_or(u32::MAX, |n| n.distance);
+        let distinct = (best.distance as f32) < config.reference_ratio * rival as f32;
+        let j = best.index as usize;
+        if best.distance <= config.hamming_low && distinct && current.is_open(j) {
+            current.sights[j] = Some(Sight { landmark: Some(id), point_world: landmark.position });
+            rotation.add(keyframe.features.features[i].angle_rad - current.features.features[j].angle_rad, best.index);
         }
     }
     rotation.for_each_outlier(|j| current.sights[j as usize] = None);
@@ -173,6 +193,19 @@ pub fn search_keyframe(config: &TrackingConfig, keyframe: &KeyFrame, map: &Map, 
 
 /// Matches landmarks of the local map that the frame does not see yet. `visible` is refilled with those that lie in view.
 pub fn search_local_map(
+    sensor: &SensorModel,
+    config: &TrackingConfig,
+    map: &Map,
+    landmarks: &[LandmarkId],
+    current: &mut TrackedFrame,
+    visible: &mut Vec<LandmarkId>,
+) {
+    dispatch!(Level::new(), simd => match_local_map(simd, sensor, config, map, landmarks, current, visible));
+}
+
+#[inline(always)]
+fn match_local_map<S: Simd>(
+    _: S,
     sensor: &SensorModel,
     config: &TrackingConfig,
     map: &Map,
@@ -207,6 +240,7 @@ pub fn search_local_map(
 }
 
 /// The open feature around a projection whose descriptor is nearest, at the predicted octave or one finer.
+#[inline(always)]
 fn best_near(
     current: &TrackedFrame,
     projector: &Projector<'_>,

@@ -1,0 +1,98 @@
+#!/usr/bin/env python3
+"""Times the detector's forward pass beside ONNX Runtime and ncnn: one thread each, the same weights, the same 352×352 input.
+
+python3 benches/peers_detector.py [DATA_FOLDER] [--rounds 5] [--runs 100]
+(pip: onnxruntime, ncnn, numpy; DATA_FOLDER defaults to YFSLAM_DATA, else ../shared/data)
+
+The engines take turns for a few rounds, so that all see the same load; reported are the minimum and the median of the process
+CPU time, in ms, and the ratio of our best minimum to the faster peer's. Loading and the first runs do not count.
+"""
+import argparse
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import time
+
+import ncnn
+import numpy as np
+import onnxruntime
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+WARM_UP = 10
+
+
+def clock(runs, call):
+    for _ in range(WARM_UP):
+        call()
+    times = []
+    for _ in range(runs):
+        start = time.process_time_ns()
+        call()
+        times.append((time.process_time_ns() - start) / 1e6)
+    return times
+
+
+def onnx_runtime(models, image):
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    session = onnxruntime.InferenceSession(models / "yolo-fastestv2-coco.onnx", options, providers=["CPUExecutionProvider"])
+    name = session.get_inputs()[0].name
+    return lambda: session.run(None, {name: image[None]})
+
+
+def ncnn_net(models, image, half):
+    net = ncnn.Net()
+    net.opt.num_threads = 1
+    net.opt.use_vulkan_compute = False
+    net.opt.use_fp16_packed = net.opt.use_fp16_storage = net.opt.use_fp16_arithmetic = half
+    assert net.load_param(str(models / "yolo-fastestv2-opt.param")) == 0
+    assert net.load_model(str(models / "yolo-fastestv2-opt.bin")) == 0
+    mat = ncnn.Mat(image)
+    inputs, outputs = net.input_names(), net.output_names()
+
+    def run():
+        extractor = net.create_extractor()
+        extractor.input(inputs[0], mat)
+        return [extractor.extract(output)[1] for output in outputs]
+
+    run.net = net
+    return run
+
+
+def ours(models, runs):
+    command = ["cargo", "run", "--release", "--quiet", "-p", "yfslam-detect", "--example", "time_detector", "--"]
+    output = subprocess.run([*command, models / "yolo-fastestv2-coco.onnx", str(runs)], cwd=ROOT, check=True, capture_output=True)
+    return [json.loads(line) for line in output.stdout.splitlines()]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("data", nargs="?", default=os.environ.get("YFSLAM_DATA", ROOT.parent / "shared/data"))
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--runs", type=int, default=100)
+    arguments = parser.parse_args()
+    models = pathlib.Path(arguments.data) / "models"
+    image = np.random.default_rng(0).random((3, 352, 352), dtype=np.float32)
+    peers = {
+        f"ONNX Runtime {onnxruntime.__version__}": onnx_runtime(models, image),
+        f"ncnn {ncnn.__version__} fp16 storage": ncnn_net(models, image, True),
+        f"ncnn {ncnn.__version__} fp32": ncnn_net(models, image, False),
+    }
+    ours(models, 1)  # builds
+    times = {}
+    for _ in range(arguments.rounds):
+        for name, run in peers.items():
+            times.setdefault(name, []).extend(clock(arguments.runs, run))
+        for line in ours(models, arguments.runs):
+            for what in ("forward", "detect"):
+                times.setdefault(f"yfslam {line['level']}, {what}", []).extend(line[f"{what}_all_ms"])
+    for name, values in times.items():
+        print(f"{name:36} min {min(values):6.2f} ms   median {statistics.median(values):6.2f} ms")
+    best_peer = min(peers, key=lambda name: min(times[name]))
+    mine = min((name for name in times if name.endswith("forward")), key=lambda name: min(times[name]))
+    print(f"ratio of minima, {mine} to {best_peer}: {min(times[mine]) / min(times[best_peer]):.2f}")
+
+
+main()

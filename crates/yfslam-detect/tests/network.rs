@@ -1,0 +1,75 @@
+//! The whole path from ONNX bytes to raw outputs, on a network made on the spot, against a naive executor.
+#![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
+
+mod common;
+
+use common::{Net, Size, Style, random};
+use yfslam_detect::{DetectorConfig, Level, YoloFastestV2, available_levels};
+
+fn levels() -> Vec<Level> {
+    let mut levels = available_levels();
+    levels.push(Level::fallback());
+    levels
+}
+
+fn config(classes: usize) -> DetectorConfig {
+    DetectorConfig { class_names: (0..classes).map(|class| format!("class {class}")).collect(), ..Default::default() }
+}
+
+fn image(size: &Size, seed: u64) -> Vec<f32> {
+    let mut state = seed;
+    (0..3 * size.height * size.width).map(|_| random(&mut state)).collect()
+}
+
+/// Runs `net` at `level`; all outputs in one list.
+fn run(net: &Net, classes: usize, image: &[f32], level: Level) -> Vec<f32> {
+    let detector = YoloFastestV2::from_bytes("synthetic", &net.to_onnx(), &config(classes));
+    let mut detector = detector.expect("the synthetic network loads").with_level(level);
+    detector.forward(image).expect("the image has the right size");
+    detector.raw_outputs().into_iter().flat_map(|output| output.values).collect()
+}
+
+fn check(size: &Size, style: Style, seed: u64) {
+    let net = Net::yolo(size, style, seed);
+    let image = image(size, seed + 1);
+    let expected: Vec<f64> = net.run(&image).concat();
+    let scale = expected.iter().map(|value| value.abs()).fold(1.0, f64::max);
+    for level in levels() {
+        let values = run(&net, size.classes, &image, level);
+        assert_eq!(values.len(), expected.len());
+        let error = values.iter().zip(&expected).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max);
+        assert!(error < 1e-5 * scale, "{style:?} at {level:?}: {error} of {scale}");
+    }
+}
+
+#[test]
+fn every_level_computes_what_the_operators_are_defined_to_compute() {
+    check(&Size { height: 96, width: 96, channels: 24, classes: 80 }, Style::Folded, 1);
+}
+
+#[test]
+fn every_spelling_of_the_graph_gives_the_same_network() {
+    for style in [Style::Folded, Style::Unfolded, Style::Split] {
+        check(&Size { height: 64, width: 96, channels: 8, classes: 3 }, style, 2);
+    }
+}
+
+#[test]
+fn sizes_and_channels_that_fill_no_vector_are_computed_right() {
+    for (height, width, channels, classes) in [(32, 32, 1, 1), (32, 160, 5, 2), (224, 32, 7, 13), (96, 160, 24, 4)] {
+        check(&Size { height, width, channels, classes }, Style::Folded, 3);
+    }
+}
+
+#[test]
+fn a_level_with_fused_multiply_add_gives_the_same_bits_as_any_other() {
+    let size = Size { height: 96, width: 160, channels: 24, classes: 4 };
+    let (net, image) = (Net::yolo(&size, Style::Folded, 4), image(&size, 5));
+    let fused = |level: &Level| {
+        let name = format!("{level:?}");
+        ["Avx", "Neon"].iter().any(|fused| name.starts_with(fused))
+    };
+    let mut outputs = available_levels().into_iter().filter(fused).map(|level| run(&net, 4, &image, level));
+    let Some(first) = outputs.next() else { return };
+    assert!(outputs.all(|other| other == first));
+}

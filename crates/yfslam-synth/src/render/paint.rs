@@ -1,0 +1,158 @@
+//! Colour of every pixel, tile by tile; pixels on an edge are shaded at four places.
+//!
+//! In: what each pixel sees. Out: linear RGB, depth and instance per pixel.
+
+use super::Picture;
+use super::project::Projected;
+use super::raster::{NOTHING, Visibility};
+use super::rays::{RayTable, TILE};
+use super::shade::{Surface, View};
+use crate::light::Occluder;
+
+/// Four samples in a rotated grid, in pixels from the centre.
+const SUBSAMPLES: [[f32; 2]; 4] = [[-0.125, -0.375], [0.375, -0.125], [0.125, 0.375], [-0.375, 0.125]];
+
+/// Depth jump between neighbours on one patch that counts as an edge, relative.
+const DEPTH_JUMP: f32 = 0.03;
+
+/// Reads visibility, writes colours.
+pub struct Painter<'a> {
+    /// Viewing rays.
+    pub rays: &'a RayTable,
+    /// Scene.
+    pub view: &'a View<'a>,
+    /// Triangles by the index that visibility uses.
+    pub triangles: &'a [Projected],
+    /// What each pixel sees.
+    pub seen: &'a Visibility,
+    /// Whether edges are smoothed.
+    pub antialias: bool,
+}
+
+/// The distinct triangles around a pixel.
+type Candidates = ([u32; 9], usize);
+
+impl Painter<'_> {
+    /// Paints the band of tiles number `band` into `out`, which holds the band's rows.
+    pub fn band(&self, band: usize, out: &mut Picture) {
+        let (width, rows) = (self.rays.width, out.depth.len() / self.rays.width);
+        let mut near = Vec::new();
+        for column in (0..width).step_by(TILE) {
+            self.occluders_near(band, column, &mut near);
+            let mut last: Option<(u32, Surface)> = None;
+            for row in 0..rows {
+                for x in column..(column + TILE).min(width) {
+                    let index = (band * TILE + row) * self.rays.stride + x;
+                    let id = self.seen.triangle[index];
+                    if id == NOTHING {
+                        continue;
+                    }
+                    let t = &self.triangles[id as usize];
+                    let surface = match &last {
+                        Some((known, surface)) if *known == id => surface,
+                        _ => &last.insert((id, self.view.surface(t))).1,
+                    };
+                    let pixel = row * width + x;
+                    out.depth[pixel] = 1.0 / self.seen.inverse_depth[index];
+                    out.instance[pixel] = self.view.instance(t);
+                    out.color[pixel] = match self.edge_candidates(band * TILE + row, x) {
+                        Some(candidates) => self.supersample(index, &near, &candidates),
+                        None => self.view.shade(surface, &near, self.rays.x[index], self.rays.y[index]),
+                    };
+                }
+            }
+        }
+    }
+
+    /// The occluders that reach into what the tile sees.
+    fn occluders_near(&self, band: usize, column: usize, near: &mut Vec<Occluder>) {
+        near.clear();
+        if self.view.occluders.is_empty() {
+            return;
+        }
+        let tile = &self.rays.tiles[band * (self.rays.stride / TILE) + column / TILE];
+        let (mut nearest, mut farthest) = (f32::INFINITY, 0.0f32);
+        for row in band * TILE..(band + 1) * TILE {
+            let start = row * self.rays.stride + column;
+            for &w in self.seen.inverse_depth[start..start + TILE].iter().filter(|&&w| w > 0.0) {
+                (nearest, farthest) = (nearest.min(1.0 / w), farthest.max(1.0 / w));
+            }
+        }
+        // Box around the visible part of the tile's frustum, in camera coordinates.
+        let span = |range: [f32; 2]| {
+            let ends = [range[0] * nearest, range[0] * farthest, range[1] * nearest, range[1] * farthest];
+            [ends.iter().copied().fold(f32::INFINITY, f32::min), ends.iter().copied().fold(f32::NEG_INFINITY, f32::max)]
+        };
+        let sides = [span(tile.x), span(tile.y), [nearest, farthest]];
+        near.extend(self.view.occluders.iter().filter(|o| {
+            let gaps = (0..3).map(|k| (sides[k][0] - o.center[k]).max(o.center[k] - sides[k][1]).max(0.0).powi(2));
+            gaps.sum::<f32>() < o.reach() * o.reach()
+        }));
+    }
+
+    /// The triangles around the pixel if an edge passes near it and edges are to be smoothed.
+    fn edge_candidates(&self, row: usize, column: usize) -> Option<Candidates> {
+        if !self.antialias {
+            return None;
+        }
+        let stride = self.rays.stride;
+        let center = row * stride + column;
+        if row > 0 && row + 1 < self.rays.height && column > 0 && column + 1 < self.rays.width {
+            // Most pixels lie inside a triangle.
+            let rows = [center - stride, center, center + stride].map(|i| &self.seen.triangle[i - 1..=i + 1]);
+            let id = self.seen.triangle[center];
+            if rows.iter().flat_map(|ids| ids.iter()).fold(0, |all, &other| all | (other ^ id)) == 0 {
+                return None;
+            }
+        }
+        let (id, w) = (self.seen.triangle[center], self.seen.inverse_depth[center]);
+        let mut patch = None;
+        let (mut list, mut count, mut edge) = ([id; 9], 1, false);
+        for y in row.saturating_sub(1)..=(row + 1).min(self.rays.height - 1) {
+            for x in column.saturating_sub(1)..=(column + 1).min(self.rays.width - 1) {
+                let other = self.seen.triangle[y * stride + x];
+                if other == id || other == NOTHING || list[..count].contains(&other) {
+                    continue;
+                }
+                list[count] = other;
+                count += 1;
+                let jump = (self.seen.inverse_depth[y * stride + x] - w).abs() > DEPTH_JUMP * w;
+                let patch = *patch.get_or_insert_with(|| self.view.patch(&self.triangles[id as usize]));
+                edge |= jump || self.view.patch(&self.triangles[other as usize]) != patch;
+            }
+        }
+        edge.then_some((list, count))
+    }
+
+    /// Colour of an edge pixel: four places decide how much of the pixel each triangle covers, and each triangle is
+    /// shaded once, in the middle of its places (as multisampling hardware does). Places that hit none of the candidates
+    /// count for the triangle at the centre.
+    fn supersample(&self, index: usize, near: &[Occluder], candidates: &Candidates) -> [f32; 3] {
+        let (list, count) = candidates;
+        // Per candidate: number of places and their sum, in normalised coordinates.
+        let mut shares = [(0.0f32, 0.0f32, 0.0f32); 9];
+        for [dx, dy] in SUBSAMPLES {
+            let x = self.rays.x[index] + dx * self.rays.pitch[0];
+            let y = self.rays.y[index] + dy * self.rays.pitch[1];
+            let at = |p: &[f32; 3]| p[0] * x + p[1] * y + p[2];
+            let (mut nearest, mut hit) = (0.0, 0);
+            for (slot, &id) in list[..*count].iter().enumerate() {
+                let t = &self.triangles[id as usize];
+                let w = at(&t.inverse_depth);
+                if w > nearest && t.edges.iter().all(|edge| at(edge) >= 0.0) {
+                    (nearest, hit) = (w, slot);
+                }
+            }
+            let (n, sx, sy) = &mut shares[hit];
+            let (px, py) = if nearest > 0.0 { (x, y) } else { (self.rays.x[index], self.rays.y[index]) };
+            (*n, *sx, *sy) = (*n + 1.0, *sx + px, *sy + py);
+        }
+        let mut sum = [0.0; 3];
+        for (&id, (n, sx, sy)) in list.iter().zip(shares).filter(|(_, (n, ..))| *n > 0.0) {
+            let surface = self.view.surface(&self.triangles[id as usize]);
+            let color = self.view.shade(&surface, near, sx / n, sy / n);
+            (0..3).for_each(|k| sum[k] += color[k] * n / SUBSAMPLES.len() as f32);
+        }
+        sum
+    }
+}
