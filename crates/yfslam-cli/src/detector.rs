@@ -4,11 +4,24 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
+use clap::Args;
 use serde::Serialize;
 use yfslam::image::RgbImage;
 use yfslam::{Config, Detection, Detector, DetectorError};
 use yfslam_detect::{DetectorConfig, YoloFastestV2};
+
+/// Which network finds people.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "System")]
+pub struct DetectorArgs {
+    /// Network that finds people: YOLO-FastestV2 as ONNX. Methods `boxes` and `yf` need it on recorded sequences.
+    #[arg(long, value_name = "FILE.onnx")]
+    pub detector: Option<PathBuf>,
+    /// Names of the network's classes, in its order [default: those in the file, else those of COCO].
+    #[arg(long, value_name = "NAME,NAME", value_delimiter = ',', requires = "detector")]
+    detector_classes: Vec<String>,
+}
 
 /// Which model found the boxes.
 #[derive(Clone, Debug, Serialize)]
@@ -35,11 +48,18 @@ pub struct LoadedDetector {
 ///
 /// # Errors
 /// The file cannot be read, is no ONNX model, or holds another network.
-pub fn load(file: &Path, config: &Config) -> Result<LoadedDetector> {
+pub fn load(args: &DetectorArgs, file: &Path, config: &Config) -> Result<LoadedDetector> {
     let bytes =
         std::fs::read(file).with_context(|| format!("cannot read the detector {}; check the path", file.display()))?;
     let score_threshold = config.dynamic.keep_score.min(config.dynamic.open_score);
-    let detector_config = DetectorConfig { score_threshold, ..Default::default() };
+    ensure!(
+        score_threshold > 0.0 && score_threshold < 1.0,
+        "dynamic.keep_score and dynamic.open_score are {} and {}; set them between 0 and 1",
+        config.dynamic.keep_score,
+        config.dynamic.open_score
+    );
+    let class_names = args.detector_classes.clone();
+    let detector_config = DetectorConfig { score_threshold, class_names, ..Default::default() };
     let network = YoloFastestV2::from_bytes(&file.display().to_string(), &bytes, &detector_config)?;
     let identity = ModelIdentity {
         file: file.into(),

@@ -63,7 +63,16 @@ pub fn print(text: &str) -> Result<()> {
 
 /// Why the program ends without success.
 pub fn error(error: &anyhow::Error) {
-    say("error", &format!("{error:#}"));
+    say("error", &explain(error));
+}
+
+/// The error and its causes, without those that the error before has told already.
+pub fn explain(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |told, cause| match told {
+        told if told.is_empty() => cause,
+        told if told.contains(&cause) => told,
+        told => format!("{told}: {cause}"),
+    })
 }
 
 /// Whether the reader of our output has gone, as `head` does: no failure of ours.
@@ -74,4 +83,17 @@ pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
 fn say(kind: &str, text: &str) {
     // Nobody is left to tell if standard error is closed.
     let _ = writeln!(io::stderr().lock(), "{kind}: {text}");
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::anyhow;
+
+    use super::*;
+
+    #[test]
+    fn a_cause_is_told_once() {
+        let error = anyhow!("no such file").context("cannot read x: no such file; check the path").context("no run");
+        assert_eq!(explain(&error), "no run: cannot read x: no such file; check the path");
+    }
 }

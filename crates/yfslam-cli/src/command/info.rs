@@ -13,7 +13,7 @@ use yfslam_io::time::{format_stamp, seconds};
 use yfslam_io::{CameraSource, DepthStatistics, Sequence, TrajectoryFile};
 
 use crate::source::{SourceArgs, camera, open_sequence};
-use crate::terminal::print;
+use crate::terminal::{explain, print};
 
 /// Frames that are opened, evenly over the sequence.
 const SAMPLES: usize = 20;
@@ -46,7 +46,7 @@ fn recorded(args: &SourceArgs) -> Result<String> {
     images(&mut text, &sequence, camera.as_ref().ok())?;
     match &camera {
         Ok(camera) => describe_camera(&mut text, camera)?,
-        Err(error) => writeln!(text, "camera        not usable: {error:#}")?,
+        Err(error) => writeln!(text, "camera        not usable: {}", explain(error))?,
     }
     match sequence.groundtruth_path() {
         Some(path) => truth(&mut text, &path, &sequence)?,

@@ -10,7 +10,7 @@ use yfslam::dynamic::Method;
 use yfslam_eval::{EvalOptions, Evaluation, ExpectedFrames, TableStyle};
 
 use crate::accuracy::{MatchArgs, judge, to_eval};
-use crate::detector::{self, LoadedDetector};
+use crate::detector::{self, DetectorArgs, LoadedDetector};
 use crate::output::OutputFolder;
 use crate::overlay::Overlay;
 use crate::pipeline::{Outcome, Pipeline};
@@ -18,7 +18,7 @@ use crate::progress::Progress;
 use crate::report::{BoxSource, Report, Run};
 use crate::settings::SettingsArgs;
 use crate::source::{Source, SourceArgs, Truth};
-use crate::terminal::Terminal;
+use crate::terminal::{Terminal, explain};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -46,9 +46,8 @@ pub struct RunArgs {
     source: SourceArgs,
     #[command(flatten)]
     settings: SettingsArgs,
-    /// Network that finds people: YOLO-FastestV2 as ONNX. Methods `boxes` and `yf` need it on recorded sequences.
-    #[arg(long, value_name = "FILE.onnx", help_heading = "System")]
-    detector: Option<PathBuf>,
+    #[command(flatten)]
+    detector: DetectorArgs,
     /// Where results go [default: yfslam-out/<name of the sequence>].
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: Option<PathBuf>,
@@ -114,8 +113,8 @@ fn load_detector(args: &RunArgs, config: &Config) -> Result<Option<LoadedDetecto
         Method::Boxes => "boxes",
         Method::Yf => "yf",
     };
-    match &args.detector {
-        Some(file) => Ok(Some(detector::load(file, config)?)),
+    match &args.detector.detector {
+        Some(file) => Ok(Some(detector::load(&args.detector, file, config)?)),
         None if args.source.is_synthetic() => Ok(None),
         None => bail!(
             "method {method} keeps people out and needs a network that finds them; give --detector FILE.onnx (YOLO-FastestV2 as \
@@ -128,7 +127,7 @@ fn load_detector(args: &RunArgs, config: &Config) -> Result<Option<LoadedDetecto
 fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Option<Truth>> {
     match source.truth(&args.source, args.groundtruth.as_deref()) {
         Err(error) if args.groundtruth.is_none() => {
-            terminal.warn(&format!("no evaluation: {error:#}"));
+            terminal.warn(&format!("no evaluation: {}", explain(&error)));
             Ok(None)
         }
         found => found.context("the ground truth cannot be used"),

@@ -1,0 +1,233 @@
+//! What can be wrong with the input: an error that names file, value and cure, or a counted skip where a robot would go on.
+#![allow(clippy::unwrap_used, reason = "a test may")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{SMALL_WORLD, edit_lines, fails, record, report, succeeds};
+use tempfile::TempDir;
+use yfslam::image::Image;
+use yfslam_io::write::{write_color_png, write_depth_png};
+
+fn recording() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    record(&folder.path().join("seq"));
+    folder
+}
+
+/// Runs a recording of which one frame is broken: the others are tracked, the broken one is counted and named.
+#[track_caller]
+fn assert_skipped(folder: &TempDir, reason: &str, file: &str) {
+    let output = succeeds(folder.path(), &["run", "seq", "--method", "none", "--out", "out"]);
+    let frames = &report(&folder.path().join("out"))["frames"];
+    assert_eq!((frames["read"].as_u64(), frames["tracked"].as_u64()), (Some(11), Some(11)), "{frames}");
+    assert_eq!((&frames["skipped"], &frames["skipped_by_reason"][reason]), (&1.into(), &1.into()), "{frames}");
+    assert!(frames["first_skipped"].as_str().unwrap().contains(file), "{frames}");
+    assert!(output.stdout.contains(&format!("1 × {reason}")) && output.stdout.contains(file), "{}", output.stdout);
+}
+
+fn for_each_frame(folder: &TempDir, kind: &str, change: impl Fn(&Path)) {
+    for i in 0..12 {
+        change(&folder.path().join(format!("seq/{kind}/{i}.png")));
+    }
+}
+
+fn truncate(path: &Path) {
+    let bytes = fs::read(path).unwrap();
+    fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
+}
+
+const RUN: [&str; 4] = ["run", "seq", "--method", "none"];
+
+#[test]
+fn a_missing_an_empty_and_a_wrong_folder_are_told_apart() {
+    let folder = recording();
+    fs::create_dir(folder.path().join("empty")).unwrap();
+    let run = |sequence, words: &[&str]| fails(folder.path(), &["run", sequence, "--method", "none"], words);
+    run("nowhere", &["nowhere", "No such file", "check the path"]);
+    run("empty", &["empty", "no rgb.txt", "name a folder in TUM RGB-D layout"]);
+    run(".", &["did you mean ./seq?"]);
+    run("seq/rgb.txt", &["is a file, not a folder"]);
+    run("synth:strolling_xyz", &["strolling_xyz", "walking_xyz"]);
+}
+
+#[test]
+fn a_missing_image_is_a_skip_and_all_missing_is_an_error() {
+    let folder = recording();
+    fs::remove_file(folder.path().join("seq/rgb/5.png")).unwrap();
+    assert_skipped(&folder, "missing file", "rgb/5.png");
+    for_each_frame(&folder, "rgb", |path| drop(fs::remove_file(path)));
+    fails(folder.path(), &RUN, &["seq", "rgb/0.png", "unpack the images"]);
+}
+
+#[test]
+fn a_truncated_image_is_a_skip_and_all_truncated_is_an_error() {
+    let folder = recording();
+    truncate(&folder.path().join("seq/depth/4.png"));
+    assert_skipped(&folder, "damaged image", "depth/4.png");
+    for_each_frame(&folder, "depth", truncate);
+    fails(folder.path(), &RUN, &["depth/0.png", "damaged", "unpack the file again"]);
+}
+
+#[test]
+fn an_image_of_the_wrong_type_is_a_skip_and_all_wrong_is_an_error() {
+    let folder = recording();
+    fs::write(folder.path().join("seq/rgb/3.png"), "RIFF....WEBP").unwrap();
+    assert_skipped(&folder, "wrong type of image", "rgb/3.png");
+    // Colour where depth is expected, as after a mix-up of the lists.
+    edit_lines(&folder.path().join("seq/depth.txt"), |_, line| Some(line.replace("depth/", "rgb/")));
+    fails(folder.path(), &RUN, &["rgb/0.png", "16-bit grey PNG"]);
+}
+
+#[test]
+fn depth_of_another_size_is_a_skip_and_all_of_another_size_is_an_error() {
+    let folder = recording();
+    let write =
+        |path: &Path| write_depth_png(path, &Image::from_vec(160, 120, vec![9000; 160 * 120]).unwrap()).unwrap();
+    write(&folder.path().join("seq/depth/6.png"));
+    assert_skipped(&folder, "wrong size of image", "depth/6.png");
+    for_each_frame(&folder, "depth", write);
+    fails(folder.path(), &RUN, &["depth/0.png", "160×120", "320×240", "register depth to colour"]);
+    for_each_frame(&folder, "rgb", |path| write_color_png(path, &Image::new(64, 48)).unwrap());
+    fails(folder.path(), &RUN, &["rgb/0.png", "64×48", "camera file"]);
+}
+
+#[test]
+fn depth_without_any_measurement_is_a_skip_and_nothing_but_that_is_an_error() {
+    let folder = recording();
+    let blind = |path: &Path| write_depth_png(path, &Image::new(320, 240)).unwrap();
+    blind(&folder.path().join("seq/depth/7.png"));
+    assert_skipped(&folder, "no depth in any pixel", "depth/7.png");
+    for_each_frame(&folder, "depth", blind);
+    fails(folder.path(), &RUN, &["depth/0.png", "no depth in any pixel", "check the depth sensor"]);
+}
+
+#[test]
+fn frames_without_features_give_no_trajectory_and_the_error_says_what_was_missing() {
+    let folder = recording();
+    for_each_frame(&folder, "rgb", |path| write_color_png(path, &Image::new(320, 240)).unwrap());
+    fails(
+        folder.path(),
+        &RUN,
+        &["no trajectory", "the best had 0 features", "tracking.init_min_features asks for 500"],
+    );
+}
+
+#[test]
+fn repeated_and_backward_stamps_are_counted_skips_and_an_unsorted_list_is_an_error() {
+    let folder = recording();
+    let list = folder.path().join("seq/rgb.txt");
+    // Line 3 repeats the stamp of line 2; line 8 runs back before line 1.
+    edit_lines(&list, |i, line| {
+        let name = line.split_once(' ').unwrap().1;
+        Some(match i {
+            3 => format!("0.066666667 {name}"),
+            8 => format!("0.000000001 {name}"),
+            _ => line.to_owned(),
+        })
+    });
+    let output = succeeds(folder.path(), &["run", "seq", "--method", "none", "--out", "out"]);
+    let report = report(&folder.path().join("out"));
+    let association = &report["association"];
+    assert_eq!(association["duplicate_stamps_skipped"], 1, "{association}");
+    assert_eq!(association["backward_stamps_skipped"], 1, "{association}");
+    assert_eq!(report["frames"]["tracked"], 10);
+    assert!(output.stdout.contains("1 × duplicate stamp, 1 × stamp runs backward"), "{}", output.stdout);
+
+    edit_lines(&list, |i, line| Some(format!("{} {}", 100 - i, line.split_once(' ').unwrap().1)));
+    fails(folder.path(), &RUN, &["rgb.txt", "stamps run backward", "sort the file"]);
+    edit_lines(&list, |i, line| Some(if i == 4 { "soon rgb/4.png".into() } else { line.to_owned() }));
+    fails(folder.path(), &RUN, &["rgb.txt:5", "'soon'", "decimal seconds"]);
+}
+
+#[test]
+fn images_that_are_never_taken_together_are_an_error_that_names_the_stamps() {
+    let folder = recording();
+    edit_lines(&folder.path().join("seq/depth.txt"), |_, line| Some(format!("77{line}")));
+    fails(folder.path(), &RUN, &["no colour image has a depth image within 20.0 ms", "770.0", "same clock"]);
+}
+
+#[test]
+fn a_depth_factor_that_cannot_be_is_refused_with_one_that_can() {
+    let folder = recording();
+    let run = |factor, words: &[&str]| fails(folder.path(), &[&RUN[..], &["--depth-factor", factor]].concat(), words);
+    run("1", &["depth factor 1 ", "--depth-factor 5000"]);
+    run("1000000", &["depth factor 1000000 ", "--depth-factor 5000"]);
+    run("-5", &["depth factor is -5", "1000 for millimetres"]);
+}
+
+#[test]
+fn a_camera_that_is_not_there_is_an_error_with_the_presets() {
+    let folder = recording();
+    fails(folder.path(), &[&RUN[..], &["--camera", "tum9"]].concat(), &["tum9", "tum1, tum2, tum3, bonn"]);
+    fs::remove_file(folder.path().join("seq/camera.toml")).unwrap();
+    fails(folder.path(), &RUN, &["seq", "no camera file", "--camera"]);
+    fails(folder.path(), &["run", SMALL_WORLD, "--camera", "tum1"], &["brings its own camera"]);
+}
+
+#[test]
+fn ground_truth_with_nan_is_an_error_where_it_was_asked_for_and_a_warning_where_it_merely_lies_there() {
+    let folder = recording();
+    let truth = folder.path().join("seq/groundtruth.txt");
+    edit_lines(&truth, |i, line| Some(if i == 2 { "0.066666667 nan 0 0 0 0 0 1".into() } else { line.to_owned() }));
+    let explicit = [&RUN[..], &["--groundtruth", "seq/groundtruth.txt"]].concat();
+    fails(folder.path(), &explicit, &["groundtruth.txt:3", "tx is 'nan'", "repair the value"]);
+    let output = succeeds(folder.path(), &RUN);
+    assert!(output.stderr.contains("no evaluation: seq/groundtruth.txt:3"), "{}", output.stderr);
+    fails(folder.path(), &["eval", "seq/groundtruth.txt", "yfslam-out/seq/live.txt"], &["groundtruth.txt:3", "'nan'"]);
+}
+
+#[test]
+fn ground_truth_of_another_recording_fails_the_run_but_not_its_trajectory() {
+    let folder = recording();
+    edit_lines(&folder.path().join("seq/groundtruth.txt"), |_, line| Some(format!("9{line}")));
+    fails(folder.path(), &[&RUN[..], &["--groundtruth", "seq/groundtruth.txt"]].concat(), &["no overlap in time"]);
+    assert!(folder.path().join("yfslam-out/seq/trajectory.txt").is_file());
+}
+
+#[test]
+fn without_a_detector_the_error_says_how_to_go_on() {
+    let folder = recording();
+    for method in ["yf", "boxes"] {
+        let words = [method, "--detector FILE.onnx", "--method none"];
+        fails(folder.path(), &["run", "seq", "--method", method], &words);
+    }
+}
+
+#[test]
+fn an_unreadable_or_foreign_network_is_refused() {
+    let folder = recording();
+    fs::write(folder.path().join("text.onnx"), "This is not a network.").unwrap();
+    let run = |file, words: &[&str]| fails(folder.path(), &["run", "seq", "--detector", file], words);
+    run("nowhere.onnx", &["nowhere.onnx", "check the path"]);
+    run("text.onnx", &["text.onnx", "not a readable ONNX model", "export it again"]);
+    // A valid protobuf without a graph.
+    fs::write(folder.path().join("bare.onnx"), [0x08, 0x08]).unwrap();
+    run("bare.onnx", &["bare.onnx"]);
+}
+
+#[test]
+fn an_unknown_key_or_a_bad_value_in_the_configuration_is_named() {
+    let folder = recording();
+    let refuse = |toml: &str, words: &[&str]| {
+        fs::write(folder.path().join("my.toml"), toml).unwrap();
+        fails(folder.path(), &[&RUN[..], &["--config", "my.toml"]].concat(), words);
+    };
+    refuse("[tracking]\nlocal_raduis_px = 4.0\n", &["my.toml", "line 2", "local_raduis_px", "local_radius_px"]);
+    refuse("[trakcing]\n", &["my.toml", "trakcing", "tracking"]);
+    refuse("[features]\ncount = \"many\"\n", &["my.toml", "line 2", "count"]);
+    refuse("[features\n", &["my.toml", "line 1"]);
+    fails(folder.path(), &[&RUN[..], &["--config", "nowhere.toml"]].concat(), &["nowhere.toml", "check the path"]);
+    fails(folder.path(), &[&RUN[..], &["--association-tolerance", "nan"]].concat(), &["NaN", "milliseconds"]);
+    fails(folder.path(), &[&RUN[..], &["--start", "99"]].concat(), &["99", "12 frames", "smaller start"]);
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_written_is_found_out_before_the_run() {
+    let folder = recording();
+    fs::write(folder.path().join("file"), "").unwrap();
+    fails(folder.path(), &[&RUN[..], &["--out", "file/out"]].concat(), &["file/out", "choose another folder"]);
+    fails(folder.path(), &["demo", "--out", "file"], &["file", "choose another folder"]);
+}

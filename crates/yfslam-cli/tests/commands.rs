@@ -1,0 +1,103 @@
+//! `eval`, `info`, `demo`, `config`, `completions` and the help, as a user meets them.
+#![allow(clippy::unwrap_used, reason = "a test may")]
+
+mod common;
+
+use std::fs;
+
+use common::{SMALL_WORLD, fails, record, report, succeeds, yfslam};
+use serde_json::Value;
+
+/// A closed curve, displaced by `error_m` to either side in turn.
+fn trajectory(error_m: f64) -> String {
+    let line = |i: u32| {
+        let angle = f64::from(i) * 0.1;
+        let side = if i.is_multiple_of(2) { error_m } else { -error_m };
+        format!("{:.1} {} {} {} 0 0 0 1\n", f64::from(i) * 0.1, angle.cos(), angle.sin(), side)
+    };
+    (0..60).map(line).collect()
+}
+
+#[test]
+fn eval_tells_the_errors_and_the_improvement() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, error_m) in [("truth.txt", 0.0), ("good.txt", 0.01), ("bad.txt", 0.04)] {
+        fs::write(folder.path().join(name), trajectory(error_m)).unwrap();
+    }
+    let args = ["eval", "truth.txt", "good.txt", "--versus", "bad.txt", "--delta", "1f", "--delta", "0.5m"];
+    let output = succeeds(folder.path(), &[&args[..], &["--json"]].concat());
+    let json: Value = serde_json::from_str(&output.stdout).unwrap();
+    let near = |value: &Value, expected: f64| assert!((value.as_f64().unwrap() - expected).abs() < 1e-3, "{value}");
+    near(&json["estimate"]["ate"]["translation_m"]["rmse"], 0.01);
+    near(&json["versus"]["ate"]["translation_m"]["rmse"], 0.04);
+    near(&json["estimate"]["rpe"][0]["translation_m"]["rmse"], 0.02);
+    assert_eq!(json["estimate"]["rpe"][1]["options"]["delta"]["metres"], 0.5);
+    let improvement = &json["improvement_percent"][0];
+    assert_eq!(improvement["error"], "ATE (m)");
+    assert!((improvement["rmse"].as_f64().unwrap() - 75.0).abs() < 0.1, "{improvement}");
+
+    let table = succeeds(folder.path(), &args).stdout;
+    assert!(table.contains("ATE, SE(3) (m)") && table.contains("improvement (%)"), "{table}");
+    assert!(succeeds(folder.path(), &["eval", "truth.txt", "good.txt", "--scale"]).stdout.contains("; scale "));
+    fails(folder.path(), &["eval", "truth.txt", "good.txt", "--delta", "1x"], &["'1x'", "1f", "0.5m"]);
+    fails(folder.path(), &["eval", "truth.txt", "good.txt", "--delta", "90s"], &["90 s", "smaller"]);
+    fails(folder.path(), &["eval", "truth.txt", "nowhere.txt"], &["nowhere.txt"]);
+}
+
+#[test]
+fn info_tells_what_was_found_even_where_a_run_would_fail() {
+    let folder = tempfile::tempdir().unwrap();
+    record(&folder.path().join("seq"));
+    let text = succeeds(folder.path(), &["info", "seq"]).stdout;
+    for found in ["12 pairs", "30.00 Hz", "320×240", "camera.toml", "groundtruth.txt: 12 poses", "spans 12 of 12"] {
+        assert!(text.contains(found), "no '{found}' in {text}");
+    }
+    let text = succeeds(folder.path(), &["info", "seq", "--depth-factor", "1"]).stdout;
+    assert!(text.contains("implausible") && text.contains("--depth-factor 5000"), "{text}");
+    fs::remove_file(folder.path().join("seq/camera.toml")).unwrap();
+    fs::write(folder.path().join("seq/depth/0.png"), "").unwrap();
+    let text = succeeds(folder.path(), &["info", "seq"]).stdout;
+    assert!(text.contains("not usable") && text.contains("raw") && text.contains("depth/0.png"), "{text}");
+    assert!(succeeds(folder.path(), &["info", SMALL_WORLD]).stdout.contains("12 at 30 Hz"));
+}
+
+#[test]
+fn the_demo_compares_both_methods_and_says_where_the_boxes_come_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = succeeds(folder.path(), &["demo", "--frames", "12", "--out", "demo"]);
+    assert!(output.stdout.contains("boxes from the renderer"), "{}", output.stdout);
+    assert!(output.stdout.contains("improvement (%)"), "{}", output.stdout);
+    for method in ["none", "yf"] {
+        let out = folder.path().join("demo").join(method);
+        assert!(out.join("trajectory.txt").is_file());
+        let report = report(&out);
+        assert_eq!(report["config"]["dynamic"]["method"], method);
+        assert_eq!(report["frames"]["tracked"], 12);
+        assert!(common::ate_rmse(&report) < 0.01, "{method}: {}", common::ate_rmse(&report));
+    }
+}
+
+#[test]
+fn the_printed_configuration_is_one_that_a_run_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = succeeds(folder.path(), &["config", "--method", "none", "--seed", "5"]).stdout;
+    assert!(text.contains("method = \"none\"") && text.contains("seed = 5"), "{text}");
+    fs::write(folder.path().join("my.toml"), &text).unwrap();
+    assert_eq!(succeeds(folder.path(), &["config", "--config", "my.toml"]).stdout, text);
+}
+
+#[test]
+fn help_names_every_command_and_completions_exist_for_every_shell() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = succeeds(folder.path(), &["--help"]).stdout;
+    for command in ["run", "eval", "demo", "info", "config", "completions"] {
+        assert!(help.contains(&format!("  {command} ")), "{help}");
+        let own = succeeds(folder.path(), &[command, "--help"]).stdout;
+        assert!(own.contains("Examples:"), "{own}");
+    }
+    assert!(succeeds(folder.path(), &["--version"]).stdout.starts_with("yfslam "));
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(succeeds(folder.path(), &["completions", shell]).stdout.contains("groundtruth"), "{shell}");
+    }
+    assert!(!yfslam(folder.path(), &[]).success);
+}
