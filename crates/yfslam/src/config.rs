@@ -214,6 +214,8 @@ config_section! {
         keep_score: f32 = 0.1,
         /// Overlap (IoU) of a box with the place predicted by its track.
         track_min_iou: f32 = 0.3,
+        /// Difference in depth between a track and a box of the same body, m.
+        track_max_depth_gap_m: f32 = 0.3,
         /// Frames over which a track is carried without a box.
         max_misses: usize = 10,
         /// Half the depth of a body, m. Source: NGD-SLAM's 0.33.

@@ -53,7 +53,9 @@ pub enum SetupError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FrameRejected {
     /// The images do not fit the camera.
-    #[error("the {image} image is {width}x{height}, the camera {camera_width}x{camera_height}: give the calibration of this size")]
+    #[error(
+        "the {image} image is {width}x{height}, the camera {camera_width}x{camera_height}: give the calibration of this size"
+    )]
     Size {
         /// Which image: colour or depth.
         image: &'static str,
@@ -67,7 +69,9 @@ pub enum FrameRejected {
         camera_height: usize,
     },
     /// The clock did not advance.
-    #[error("the time stamp {timestamp_ns} ns does not come after {last_ns} ns, that of the last frame: the frame is repeated or late")]
+    #[error(
+        "the time stamp {timestamp_ns} ns does not come after {last_ns} ns, that of the last frame: the frame is repeated or late"
+    )]
     Time {
         /// Stamp of the frame, ns.
         timestamp_ns: i64,

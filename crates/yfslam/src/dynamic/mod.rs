@@ -70,7 +70,8 @@ impl DynamicFilter {
             Method::None => return,
             Method::Boxes => self.regions.extend(boxes::regions(config, movable)),
             Method::Yf => {
-                self.tracks.update(config, movable, depth.raw.width(), depth.raw.height());
+                let depths = self.groups.depths_of(config, movable, depth, features);
+                self.tracks.update(config, movable, depths, [depth.raw.width(), depth.raw.height()]);
                 self.groups.regions(config, &mut self.tracks, depth, features, &mut self.regions);
             }
         }

@@ -33,8 +33,15 @@ pub struct Tracks {
 }
 
 impl Tracks {
-    /// Takes the boxes of the next frame in; `width` and `height` are those of the image, px.
-    pub fn update(&mut self, config: &DynamicConfig, detections: &[Detection], width: usize, height: usize) {
+    /// Takes the boxes of the next frame in, with the depth of the body in each, m, where it is known; `size` is the image's width and
+    /// height, px. A box whose body is nearer or farther than a track's belongs to somebody else, who walks past: the track is carried on.
+    pub fn update(
+        &mut self,
+        config: &DynamicConfig,
+        detections: &[Detection],
+        depths_m: &[Option<f32>],
+        [width, height]: [usize; 2],
+    ) {
         for track in &mut self.list {
             track.misses += 1;
             track.bbox = shifted(&track.bbox, track.velocity);
@@ -42,9 +49,11 @@ impl Tracks {
         // Pairs of track and detection by descending overlap; indices break ties.
         self.pairs.clear();
         for (t, track) in self.list.iter().enumerate() {
-            for (d, detection) in detections.iter().enumerate() {
+            for (d, (detection, depth_m)) in detections.iter().zip(depths_m).enumerate() {
                 let iou = track.bbox.iou(&detection.bbox);
-                if iou >= config.track_min_iou && detection.score >= config.keep_score {
+                let gap_m = track.depth_m.zip(*depth_m).map_or(0.0, |(a, b)| (a - b).abs());
+                let same_body = gap_m <= config.track_max_depth_gap_m + config.max_depth_step_m * track.misses as f32;
+                if iou >= config.track_min_iou && detection.score >= config.keep_score && same_body {
                     self.pairs.push((iou, t, d));
                 }
             }
@@ -112,27 +121,37 @@ mod tests {
         let config = DynamicConfig::default();
         let mut tracks = Tracks::default();
         for i in 0..10 {
-            tracks.update(&config, &[detection(50.0 + 8.0 * i as f32, 0.8)], 640, 480);
+            tracks.update(&config, &[detection(50.0 + 8.0 * i as f32, 0.8)], &[None], [640, 480]);
         }
         for _ in 0..5 {
-            tracks.update(&config, &[], 640, 480);
+            tracks.update(&config, &[], &[], [640, 480]);
         }
         assert_eq!((tracks.list.len(), tracks.list[0].misses), (1, 5));
         assert!((tracks.list[0].bbox.x_min - 162.0).abs() < 4.0, "{:?}", tracks.list[0]);
         for _ in 0..config.max_misses {
-            tracks.update(&config, &[], 640, 480);
+            tracks.update(&config, &[], &[], [640, 480]);
         }
         assert!(tracks.list.is_empty());
+    }
+
+    #[test]
+    fn somebody_who_passes_in_front_does_not_take_a_track_over() {
+        let config = DynamicConfig::default();
+        let mut tracks = Tracks::default();
+        tracks.update(&config, &[detection(50.0, 0.8)], &[Some(2.0)], [640, 480]);
+        tracks.list[0].depth_m = Some(2.0);
+        tracks.update(&config, &[detection(60.0, 0.8)], &[Some(1.2)], [640, 480]);
+        assert_eq!(tracks.list.iter().map(|t| t.misses).collect::<Vec<_>>(), [1, 0]);
     }
 
     #[test]
     fn a_faint_box_keeps_a_track_but_opens_none() {
         let config = DynamicConfig::default();
         let mut tracks = Tracks::default();
-        tracks.update(&config, &[detection(50.0, 0.15)], 640, 480);
+        tracks.update(&config, &[detection(50.0, 0.15)], &[None], [640, 480]);
         assert!(tracks.list.is_empty());
-        tracks.update(&config, &[detection(50.0, 0.5)], 640, 480);
-        tracks.update(&config, &[detection(52.0, 0.15)], 640, 480);
+        tracks.update(&config, &[detection(50.0, 0.5)], &[None], [640, 480]);
+        tracks.update(&config, &[detection(52.0, 0.15)], &[None], [640, 480]);
         assert_eq!((tracks.list.len(), tracks.list[0].misses), (1, 0));
     }
 }

@@ -5,7 +5,7 @@
 use rand_pcg::Pcg32;
 
 use crate::config::DynamicConfig;
-use crate::detection::BoundingBox;
+use crate::detection::{BoundingBox, Detection};
 use crate::dynamic::Region;
 use crate::dynamic::depth_group::{DepthGroup, Grouping, largest_exact, largest_ransac};
 use crate::dynamic::tracks::{Track, Tracks};
@@ -21,6 +21,7 @@ pub struct DepthGroups {
     rng: Pcg32,
     feature_depths: Vec<f32>,
     pixel_depths: Vec<f32>,
+    depths_m: Vec<Option<f32>>,
 }
 
 impl Default for DepthGroups {
@@ -32,7 +33,29 @@ impl Default for DepthGroups {
 impl DepthGroups {
     /// Draws start from `seed`.
     pub fn new(seed: u64) -> Self {
-        Self { rng: Pcg32::new(seed, 0x5eed), feature_depths: Vec::new(), pixel_depths: Vec::new() }
+        Self {
+            rng: Pcg32::new(seed, 0x5eed),
+            feature_depths: Vec::new(),
+            pixel_depths: Vec::new(),
+            depths_m: Vec::new(),
+        }
+    }
+
+    /// The depth of the body in each box, m; `None` where nothing was measured.
+    pub fn depths_of(
+        &mut self,
+        config: &DynamicConfig,
+        boxes: &[Detection],
+        depth: &DepthImage,
+        features: &FrameFeatures,
+    ) -> &[Option<f32>] {
+        self.depths_m.clear();
+        for detection in boxes {
+            self.collect(&detection.bbox, depth, features);
+            let body = self.body_in_front(config).map(|group| self.center(&group));
+            self.depths_m.push(body);
+        }
+        &self.depths_m
     }
 
     /// Appends the moving region of each track to `out` and notes the body's depth in the track. A track that was missed and shows no
@@ -56,8 +79,7 @@ impl DepthGroups {
                 }
                 None => return false,
             };
-            let inside = members(&self.pixel_depths, &group);
-            let center = inside.get(inside.len() / 2).copied().unwrap_or(0.5 * (group.near_m + group.far_m));
+            let center = self.center(&group);
             track.depth_m = Some(center);
             out.push(Region {
                 bbox: grown(&track.bbox, config.margin),
@@ -88,27 +110,26 @@ impl DepthGroups {
         self.pixel_depths.sort_unstable_by(f32::total_cmp);
     }
 
-    /// The depth group of the body.
-    ///
-    /// The largest group of feature depths, as the paper has it, unless enough of the box's pixels lie in front of it: a box that is
-    /// mostly wall has its largest group behind the person. Then only what is in front is asked. A track that knows its depth is
-    /// looked for there first.
+    /// The depth group of a track's body. A track that knows its depth is looked for there first.
     fn body(&mut self, config: &DynamicConfig, track: &Track) -> Option<DepthGroup> {
-        let width = 2.0 * config.group_half_width_m;
         if let Some(z) = track.depth_m {
-            let step = config.max_depth_step_m * (1 + track.misses) as f32;
-            let near =
-                within(&self.pixel_depths, z - config.group_half_width_m - step, z + config.group_half_width_m + step);
-            let group = largest_exact(near, width);
-            if let Some(g) = group
-                && g.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32
-            {
+            let reach = config.group_half_width_m + config.max_depth_step_m * (1 + track.misses) as f32;
+            let near = within(&self.pixel_depths, z - reach, z + reach);
+            let group = largest_exact(near, 2.0 * config.group_half_width_m);
+            if group.is_some_and(|g| self.is_body(config, &g)) {
                 return group;
             }
             if track.misses > 0 {
                 return None;
             }
         }
+        self.body_in_front(config)
+    }
+
+    /// The largest group of feature depths, as the paper has it, unless enough of the box's pixels lie in front of it: a box that is
+    /// mostly wall has its largest group behind the person. Then only what is in front is asked.
+    fn body_in_front(&mut self, config: &DynamicConfig) -> Option<DepthGroup> {
+        let width = 2.0 * config.group_half_width_m;
         let mut group = match config.grouping {
             Grouping::Ransac => largest_ransac(&self.feature_depths, width, &mut self.rng),
             Grouping::Exact => largest_exact(&self.feature_depths, width),
@@ -117,10 +138,21 @@ impl DepthGroups {
         loop {
             let in_front = within(&self.pixel_depths, 0.0, group.near_m - config.group_gap_m);
             match largest_exact(in_front, width) {
-                Some(g) if g.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32 => group = g,
+                Some(nearer) if self.is_body(config, &nearer) => group = nearer,
                 _ => return Some(group),
             }
         }
+    }
+
+    /// Whether a group of pixel depths is a large enough part of the box.
+    fn is_body(&self, config: &DynamicConfig, group: &DepthGroup) -> bool {
+        group.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32
+    }
+
+    /// Median depth of the pixels of a group, m.
+    fn center(&self, group: &DepthGroup) -> f32 {
+        let inside = within(&self.pixel_depths, group.near_m, group.far_m);
+        inside.get(inside.len() / 2).copied().unwrap_or(0.5 * (group.near_m + group.far_m))
     }
 }
 
@@ -129,10 +161,6 @@ fn within(sorted: &[f32], from: f32, to: f32) -> &[f32] {
     let start = sorted.partition_point(|z| *z < from);
     let end = sorted.partition_point(|z| *z <= to).max(start);
     &sorted[start..end]
-}
-
-fn members<'a>(sorted: &'a [f32], group: &DepthGroup) -> &'a [f32] {
-    within(sorted, group.near_m, group.far_m)
 }
 
 /// The box with its sides moved out by `share` of its size.
