@@ -224,20 +224,21 @@ impl NormalEquations {
             self.reduced_rhs.fixed_rows_mut::<6>(6 * k).copy_from(b);
         }
         let mut inverses = vec![Matrix3::zeros(); problem.points.len()];
-        for point in 0..problem.points.len() {
+        for (point, inverse) in inverses.iter_mut().enumerate() {
             let mut h = self.point_blocks[point];
             for i in 0..3 {
                 h[(i, i)] += lambda * h[(i, i)] + 1e-9;
             }
-            let Some(inverse) = h.try_inverse() else { continue };
-            inverses[point] = inverse;
+            // A point that nothing determines stays where it is: its inverse stays zero.
+            let Some(inverted) = h.try_inverse() else { continue };
+            *inverse = inverted;
             let range = self.point_start[point]..self.point_start[point + 1];
             for i in range.clone() {
                 let a = problem.observations[i].pose;
                 if a >= n {
                     continue;
                 }
-                let y = self.coupling[i] * inverse;
+                let y = self.coupling[i] * *inverse;
                 let rhs = y * self.point_rhs[point];
                 for row in 0..6 {
                     self.reduced_rhs[6 * a + row] -= rhs[row];
