@@ -7,19 +7,53 @@ use std::f32::consts::TAU;
 
 use fearless_simd::{Level, dispatch, prelude::*, u8x64};
 
+use super::Descriptor;
 use super::fast::Corner;
 use super::pattern::TEST_PAIRS;
-use super::{Descriptor, PATCH_RADIUS};
-use crate::image::Plane;
+use crate::image::{LANES, Plane};
 
 /// Orientations for which the pattern is rotated beforehand (the paper takes 30).
 const BINS: usize = 64;
 
-/// Bytes per row of the patch copied out of the image, a power of two above its diameter.
-const ROW: usize = 32;
+/// Largest distance of a test point from the key point, px of the level.
+pub(crate) const PATTERN_RADIUS: usize = 17;
 
-/// Bytes of the copied patch.
-const PATCH: usize = (2 * PATCH_RADIUS + 2) * ROW;
+/// Rows of the patch.
+const ROWS: usize = 2 * PATTERN_RADIUS + 1;
+
+/// Bytes of a patch: the pixels that rotated and rounded points can reach lie packed, row by row, and fit into 16 vectors of 64.
+const PATCH: usize = 1024;
+
+/// Bytes copied per row; each row overwrites what the one before copied too much.
+const COPIED: usize = LANES;
+
+/// Pixels left and right of the middle in each row of the patch: all within √½ px, the rounding, of the pattern's disc.
+const HALF_WIDTH: [usize; ROWS] = {
+    let mut half_width = [0; ROWS];
+    let mut row = 0;
+    while row < ROWS {
+        let v = row.abs_diff(PATTERN_RADIUS);
+        // (r + √½)² = r² + √2·r + ½, rounded up.
+        let reach = PATTERN_RADIUS * PATTERN_RADIUS + PATTERN_RADIUS * 17 / 12 + 1;
+        while half_width[row] < PATTERN_RADIUS && (half_width[row] + 1) * (half_width[row] + 1) + v * v <= reach {
+            half_width[row] += 1;
+        }
+        row += 1;
+    }
+    half_width
+};
+
+/// Position of each row in the patch.
+const START: [usize; ROWS] = {
+    let mut start = [0; ROWS];
+    let mut row = 1;
+    while row < ROWS {
+        start[row] = start[row - 1] + 2 * HALF_WIDTH[row - 1] + 1;
+        row += 1;
+    }
+    assert!(start[ROWS - 1] + 2 * HALF_WIDTH[ROWS - 1] < PATCH);
+    start
+};
 
 /// Positions in the patch of 64 points.
 #[derive(Clone, Debug)]
@@ -65,13 +99,12 @@ impl Describer {
         angles: &[f32],
         out: &mut Vec<Descriptor>,
     ) {
-        let mut patch = [0u8; PATCH];
+        let mut patch = [0u8; PATCH + COPIED];
         for (corner, angle_rad) in corners.iter().zip(angles) {
-            let start =
-                (usize::from(corner.y) - PATCH_RADIUS) * blurred.stride() + usize::from(corner.x) - PATCH_RADIUS;
-            let rows = blurred.data()[start..].chunks(blurred.stride());
-            for (row, source) in patch.chunks_exact_mut(ROW).zip(rows) {
-                row.copy_from_slice(&source[..ROW]);
+            let top = (usize::from(corner.y) - PATTERN_RADIUS) * blurred.stride() + usize::from(corner.x);
+            for row in 0..ROWS {
+                let source = top + row * blurred.stride() - HALF_WIDTH[row];
+                patch[START[row]..START[row] + COPIED].copy_from_slice(&blurred.data()[source..source + COPIED]);
             }
             let bin = (angle_rad * (BINS as f32 / TAU) + 0.5) as usize % BINS;
             let pattern = &self.patterns[bin];
@@ -87,7 +120,7 @@ impl Describer {
 
 /// Fetches the points one by one, then compares them in vectors.
 #[inline(always)]
-fn compare<S: Simd>(simd: S, patch: &[u8; PATCH], pattern: &Pattern) -> Descriptor {
+fn compare<S: Simd>(simd: S, patch: &[u8; PATCH + COPIED], pattern: &Pattern) -> Descriptor {
     let mut words = [0; 4];
     for (word, [first, second]) in words.iter_mut().zip(pattern) {
         let (mut a, mut b) = ([0; 64], [0; 64]);
@@ -102,7 +135,7 @@ fn compare<S: Simd>(simd: S, patch: &[u8; PATCH], pattern: &Pattern) -> Descript
 
 /// Looks 64 points up at a time, in a patch held by 16 vectors.
 #[inline(always)]
-fn compare_wide<S: Simd>(simd: S, patch: &[u8; PATCH], pattern: &Pattern) -> Descriptor {
+fn compare_wide<S: Simd>(simd: S, patch: &[u8; PATCH + COPIED], pattern: &Pattern) -> Descriptor {
     let mut blocks = [[u8x64::splat(simd, 0); 2]; 8];
     for i in 0..8 {
         blocks[i][0] = u8x64::from_slice(simd, &patch[128 * i..128 * i + 64]);
@@ -133,8 +166,9 @@ fn rotated(angle_rad: f32) -> Pattern {
     let (sin, cos) = angle_rad.sin_cos();
     let position = |[u, v]: [i8; 2]| {
         let (u, v) = (f32::from(u), f32::from(v));
-        let [column, row] = [u * cos - v * sin, u * sin + v * cos].map(|d| (d.round() + PATCH_RADIUS as f32) as usize);
-        row * ROW + column
+        let [column, row] =
+            [u * cos - v * sin, u * sin + v * cos].map(|d| (d.round() + PATTERN_RADIUS as f32) as usize);
+        START[row] + column + HALF_WIDTH[row] - PATTERN_RADIUS
     };
     std::array::from_fn(|word| {
         [0, 2].map(|first| {
@@ -159,7 +193,7 @@ mod tests {
     use crate::image::GrayImage;
     use crate::image::kernels::tests::levels;
 
-    const SIDE: usize = 2 * PATCH_RADIUS + 2;
+    const SIDE: usize = 2 * PATTERN_RADIUS + 1;
 
     /// A descriptor by its definition, at the orientation of a bin.
     fn expected(patch: &GrayImage, bin: usize) -> Descriptor {
@@ -169,11 +203,20 @@ mod tests {
             let [xa, ya, xb, yb] = pair.map(f32::from);
             let [a, b] = [(xa, ya), (xb, yb)].map(|(x, y)| {
                 let (column, row) = ((x * cos - y * sin).round() as isize, (x * sin + y * cos).round() as isize);
-                patch.row(PATCH_RADIUS.strict_add_signed(row))[PATCH_RADIUS.strict_add_signed(column)]
+                patch.row(PATTERN_RADIUS.strict_add_signed(row))[PATTERN_RADIUS.strict_add_signed(column)]
             });
             words[i / 64] |= u64::from(a < b) << (i % 64);
         }
         Descriptor(words)
+    }
+
+    #[test]
+    fn all_points_lie_in_the_pattern_and_pairs_differ() {
+        for [xa, ya, xb, yb] in TEST_PAIRS.map(|pair| pair.map(i32::from)) {
+            let limit = (PATTERN_RADIUS * PATTERN_RADIUS) as i32;
+            assert!(xa * xa + ya * ya <= limit && xb * xb + yb * yb <= limit);
+            assert_ne!((xa, ya), (xb, yb));
+        }
     }
 
     proptest! {
@@ -182,22 +225,12 @@ mod tests {
             patch in proptest::collection::vec(any::<u8>(), SIDE * SIDE), bin in 0..BINS,
         ) {
             let patch = GrayImage::from_vec(SIDE, SIDE, patch).unwrap();
-            let corner = Corner { x: PATCH_RADIUS as u16, y: PATCH_RADIUS as u16, score: 0 };
+            let corner = Corner { x: PATTERN_RADIUS as u16, y: PATTERN_RADIUS as u16, score: 0 };
             for level in levels() {
                 let mut found = Vec::new();
                 let angle_rad = bin as f32 * TAU / BINS as f32;
                 Describer::new().describe(level, &Plane::from(&patch), &[corner], &[angle_rad], &mut found);
                 prop_assert_eq!(&found[..], &[expected(&patch, bin)], "{:?}", level);
-            }
-        }
-    }
-
-    #[test]
-    fn all_points_stay_in_the_patch_in_all_orientations() {
-        for points in Describer::new().patterns.iter().flatten().flatten() {
-            for position in points.position {
-                let (column, row) = (usize::from(position) % ROW, usize::from(position) / ROW);
-                assert!(column <= 2 * PATCH_RADIUS && row <= 2 * PATCH_RADIUS);
             }
         }
     }

@@ -5,17 +5,17 @@
 
 use fearless_simd::Level;
 
-use super::brief::Describer;
+use super::brief::{Describer, PATTERN_RADIUS};
 use super::cells::Cells;
 use super::distribute::Distributor;
 use super::fast::{self, Corners, Search};
 use super::orientation::orientations;
-use super::{Descriptor, KeyPoint, PATCH_RADIUS};
+use super::{Descriptor, KeyPoint};
 use crate::config::FeatureConfig;
 use crate::image::{BLUR_RADIUS, GrayImage, Plane, Pyramid, blur};
 
-/// Distance from the image's edge within which no key point lies, px of the level: patch and blur stay inside.
-const EDGE: usize = PATCH_RADIUS + BLUR_RADIUS + 1;
+/// Distance from the image's edge within which no key point lies, px of the level: what describes it lies inside.
+const EDGE: usize = PATTERN_RADIUS + BLUR_RADIUS;
 
 /// The features of one image; key point `i` has descriptor `i`.
 #[derive(Clone, Debug, Default, PartialEq)]
