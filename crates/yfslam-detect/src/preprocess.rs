@@ -71,6 +71,8 @@ fn blend(upper: &[u8], lower: &[u8], fraction: f32, line: &mut [f32]) {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     fn stretch(image: &RgbImage, size: (usize, usize)) -> [Vec<f32>; 3] {
@@ -94,6 +96,58 @@ mod tests {
         let expected = [0.0, 50.0, 150.0, 200.0, 0.0, 50.0, 150.0, 200.0].map(|value| value / 255.0);
         for (value, expected) in plane.iter().zip(expected) {
             assert!((value - expected).abs() < 1e-6, "{plane:?}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn equals_its_definition((height, width, rows, columns) in (1..50_usize, 1..50_usize, 1..40_usize, 1..40_usize)) {
+            let pixel = |x: usize, y: usize, channel: usize| (x * 91 + y * 57 + x * y * 13 + channel * 101) as u8;
+            let pixels = (0..height * width).map(|i| [0, 1, 2].map(|channel| pixel(i % width, i / width, channel)));
+            let image = RgbImage::from_vec(width, height, pixels.collect()).unwrap();
+            let planes = stretch(&image, (rows, columns));
+            let position = |at: usize, from: usize, to: usize| {
+                let source = ((at as f64 + 0.5) * from as f64 / to as f64 - 0.5).clamp(0.0, from as f64 - 1.0);
+                (source as usize, (source as usize + 1).min(from - 1), source.fract())
+            };
+            for (channel, plane) in planes.iter().rev().enumerate() {
+                for (index, value) in plane.iter().enumerate() {
+                    let (left, right, fx) = position(index % columns, width, columns);
+                    let (upper, lower, fy) = position(index / columns, height, rows);
+                    let mix = |y: usize| {
+                        f64::from(pixel(left, y, channel)) * (1.0 - fx) + f64::from(pixel(right, y, channel)) * fx
+                    };
+                    let expected = (mix(upper) * (1.0 - fy) + mix(lower) * fy) / 255.0;
+                    prop_assert!((f64::from(*value) - expected).abs() < 1e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn equals_what_opencv_gives_for_float_images() {
+        #[derive(serde::Deserialize)]
+        struct Golden {
+            resize: Vec<Resized>,
+        }
+        #[derive(serde::Deserialize)]
+        struct Resized {
+            width: usize,
+            height: usize,
+            samples: Vec<(usize, f32)>,
+        }
+        let golden: Golden = serde_json::from_str(include_str!("../tests/golden.json")).unwrap();
+        for Resized { width, height, samples } in golden.resize {
+            let pixel = |x: usize, y: usize| [0, 31, 62].map(|c| ((x * 7 + y * 13 + c + x * y % 17 * 5) % 256) as u8);
+            let pixels = (0..width * height).map(|index| pixel(index % width, index / width)).collect();
+            let planes = stretch(&RgbImage::from_vec(width, height, pixels).unwrap(), (352, 352)).concat();
+            for (index, expected) in samples {
+                assert!(
+                    (planes[index] - expected).abs() < 5e-6,
+                    "{width}×{height} at {index}: {} {expected}",
+                    planes[index]
+                );
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 
 python3 make_golden.py DATA_FOLDER > golden.json     (pip: onnxruntime, opencv-python-headless, numpy)
 
+resize: samples of what OpenCV makes of procedural images, blue, green, red in [0, 1]
 raw:    procedural inputs, exact in float32; sums and samples of the six outputs
 boxes:  photos and video frames; resize by OpenCV on float pixels, decoding and suppression written here in numpy
 """
@@ -29,6 +30,15 @@ def procedural(kind):
         c, y, x = index // SIDE**2, index // SIDE % SIDE, index % SIDE
         value = (x * (c + 1) + y * 3 // 2 + c * 50) % 256
     return (value.astype(np.float32) / np.float32(255)).reshape(1, 3, SIDE, SIDE)
+
+
+def resized(width, height):
+    y, x, c = np.mgrid[0:height, 0:width, 0:3]
+    image = ((x * 7 + y * 13 + c * 31 + x * y % 17 * 5) % 256).astype(np.float32)[:, :, ::-1]
+    blob = cv2.resize(image, (SIDE, SIDE), interpolation=cv2.INTER_LINEAR).transpose(2, 0, 1) / np.float32(255)
+    flat = blob.ravel()
+    at = [int(i) for i in np.linspace(0, flat.size - 1, 40).astype(int)]
+    return {"width": width, "height": height, "samples": [[i, round(float(flat[i]), 6)] for i in at]}
 
 
 def sigmoid(x):
@@ -90,7 +100,8 @@ def main():
         blob = cv2.resize(image.astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_LINEAR) / np.float32(255)
         outputs = run(np.ascontiguousarray(blob.transpose(2, 0, 1)[None]))
         boxes.append({"file": file, "pixel_sum": int(image.astype(np.int64).sum()), "found": decode(outputs, image.shape[1], image.shape[0])})
-    json.dump({"score_threshold": SCORE, "iou_threshold": IOU, "raw": raw, "boxes": boxes}, sys.stdout, separators=(",", ":"))
+    resize = [resized(width, height) for width, height in ((640, 480), (1280, 720), (352, 352), (200, 100), (3, 2))]
+    json.dump({"resize": resize, "score_threshold": SCORE, "iou_threshold": IOU, "raw": raw, "boxes": boxes}, sys.stdout, separators=(",", ":"))
     print()
 
 

@@ -3,10 +3,11 @@
 //! A plane is copied into scratch, its rows set apart by zeros, for stride 2 even columns apart from odd ones. Then the values
 //! that a tap of the filter multiplies for neighbouring outputs are neighbours, too. Vectors may reach past the end of a row of
 //! the output: the next row, written later, mends it, and the last one reaches into room that every plane has.
+#![allow(clippy::needless_range_loop, reason = "iterator adapters are not inlined in every build, index loops are")]
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 
-use super::WIDEST;
+use super::{WIDEST, load};
 
 /// Output rows computed together, so that an input row that was loaded serves several of them.
 pub(crate) const ROWS: usize = 6;
@@ -156,27 +157,27 @@ fn correlate<S: Simd, const K: usize, const STRIDE: usize, const SPAN: usize>(
     for block in 0..height.div_ceil(ROWS) {
         let y = (block * ROWS).min(height.saturating_sub(ROWS));
         let mut rows = [scratch; SPAN];
-        for (index, row) in rows.iter_mut().enumerate() {
-            *row = &scratch[(y * STRIDE + index) * pitch..][..pitch + WIDEST];
+        for index in 0..SPAN {
+            rows[index] = &scratch[(y * STRIDE + index) * pitch..][..pitch + WIDEST];
         }
         for x in (0..width).step_by(S::f32s::LEN).rev() {
             let mut sums = [S::f32s::splat(simd, filter.bias); ROWS];
             for (column, weights) in geometry.columns.iter().zip(filter.weights.as_chunks::<K>().0) {
                 let mut taps = [sums[0]; K];
-                for (tap, weight) in taps.iter_mut().zip(weights) {
-                    *tap = S::f32s::splat(simd, *weight);
+                for tap in 0..K {
+                    taps[tap] = S::f32s::splat(simd, weights[tap]);
                 }
-                for (index, row) in rows.iter().enumerate() {
-                    let value = S::f32s::from_slice(simd, &row[x + column..][..S::f32s::LEN]);
-                    for (row, sum) in sums.iter_mut().enumerate() {
-                        if let Some(tap) = index.checked_sub(row * STRIDE).and_then(|tap| taps.get(tap)) {
-                            *sum = tap.mul_add(value, *sum);
+                for index in 0..SPAN {
+                    let value = load(simd, rows[index], x + column);
+                    for row in 0..ROWS {
+                        if index >= row * STRIDE && index - row * STRIDE < K {
+                            sums[row] = taps[index - row * STRIDE].mul_add(value, sums[row]);
                         }
                     }
                 }
             }
-            for (row, sum) in sums.iter().enumerate() {
-                sum.max(floor).store_slice(&mut plane[(y + row) * width + x..][..S::f32s::LEN]);
+            for row in 0..ROWS {
+                sums[row].max(floor).store_slice(&mut plane[(y + row) * width + x..][..S::f32s::LEN]);
             }
         }
     }

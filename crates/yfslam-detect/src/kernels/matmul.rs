@@ -2,6 +2,7 @@
 //!
 //! In: a list of rows of floats (one per input channel or filter tap), packed weights. Out: one row per output channel.
 //! The inner loop keeps 6 output channels × 2 vectors in registers; rows are read where they lie, nothing is copied.
+#![allow(clippy::needless_range_loop, reason = "iterator adapters are not inlined in every build, index loops are")]
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 
@@ -89,14 +90,13 @@ fn blocks<S: Simd, const V: usize>(simd: S, memory: &mut [f32], matrix: &Matrix,
     let blocks = matrix.weights.chunks_exact(matrix.depth).zip(&matrix.bias).zip(rows.outputs.as_chunks::<BLOCK>().0);
     for (block, ((weights, bias), outputs)) in blocks.enumerate() {
         let sums = product::<S, V>(simd, memory, weights, bias, rows.inputs, column);
-        for (row, (sums, output)) in sums.iter().zip(outputs).enumerate() {
-            for (vector, sum) in sums.iter().enumerate() {
-                let at = column + vector * S::f32s::LEN;
-                let mut sum = *sum;
+        for row in 0..BLOCK {
+            for vector in 0..V {
+                let (mut sum, at) = (sums[row][vector], column + vector * S::f32s::LEN);
                 if let Some(addend) = rows.addend.get(block * BLOCK + row) {
                     sum += load(simd, memory, addend + at);
                 }
-                let place = &mut memory[output + at..][..S::f32s::LEN];
+                let place = &mut memory[outputs[row] + at..][..S::f32s::LEN];
                 if rows.keep_larger {
                     sum = sum.max(S::f32s::from_slice(simd, place));
                 }
@@ -106,7 +106,7 @@ fn blocks<S: Simd, const V: usize>(simd: S, memory: &mut [f32], matrix: &Matrix,
     }
 }
 
-/// Array methods that take closures are not always inlined here, and then they cost more than the product: hence the loops.
+/// One block of output channels for `V` vectors.
 #[inline(always)]
 fn product<S: Simd, const V: usize>(
     simd: S,
@@ -117,19 +117,21 @@ fn product<S: Simd, const V: usize>(
     column: usize,
 ) -> [[S::f32s; V]; BLOCK] {
     let mut sums = [[S::f32s::splat(simd, 0.0); V]; BLOCK];
-    for (sums, bias) in sums.iter_mut().zip(bias) {
-        *sums = [S::f32s::splat(simd, *bias); V];
+    for row in 0..BLOCK {
+        sums[row] = [S::f32s::splat(simd, bias[row]); V];
     }
-    for (weights, input) in weights.iter().zip(inputs) {
-        let row = &memory[input + column..][..V * S::f32s::LEN];
+    let depth = weights.len().min(inputs.len());
+    let (weights, inputs) = (&weights[..depth], &inputs[..depth]);
+    for k in 0..depth {
+        let line = &memory[inputs[k] + column..][..V * S::f32s::LEN];
         let mut values = [sums[0][0]; V];
-        for (value, row) in values.iter_mut().zip(row.chunks_exact(S::f32s::LEN)) {
-            *value = S::f32s::from_slice(simd, row);
+        for vector in 0..V {
+            values[vector] = load(simd, line, vector * S::f32s::LEN);
         }
-        for (sums, weight) in sums.iter_mut().zip(weights) {
-            let weight = S::f32s::splat(simd, *weight);
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum = weight.mul_add(value, *sum);
+        for row in 0..BLOCK {
+            let weight = S::f32s::splat(simd, weights[k][row]);
+            for vector in 0..V {
+                sums[row][vector] = weight.mul_add(values[vector], sums[row][vector]);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The vector kernels, written once over `fearless_simd` and compiled for each instruction set.
 //!
-//! All work on one slice of floats, the network's memory, at offsets fixed when the model is loaded. They are generic over the
-//! instruction set, and everything they call must be inlined; array methods that take closures are not, hence plain loops.
+//! All work on one slice of floats, the network's memory, at offsets fixed when the model is loaded. What a kernel calls must be
+//! inlined into it, or it is compiled for the wrong instruction set.
 
 pub(crate) mod depthwise;
 pub(crate) mod matmul;

@@ -1,5 +1,10 @@
 //! A YOLO-FastestV2 network with random weights, made on the spot: as ONNX bytes, and run by a naive executor.
-#![allow(dead_code, clippy::unwrap_used, reason = "shared by test programs, of which each uses a part")]
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "shared by test programs, of which each uses a part"
+)]
 
 mod onnx;
 mod reference;
