@@ -76,7 +76,8 @@ impl Tracker {
             self.current.t_cam_world = prediction;
             let radius = factor * c.motion_radius_px;
             if search_last_frame(sensor, c, &self.last, &mut self.current, radius, &mut self.rotation)
-                >= c.motion_min_matches {
+                >= c.motion_min_matches
+            {
                 return self.current.refine_pose(sensor, &config.pose) >= c.motion_min_inliers;
             }
         }
