@@ -1,8 +1,13 @@
 //! Estimates against the truth, with the options that `run`, `eval` and `demo` share.
 
+use std::path::Path;
+
 use anyhow::{Result, bail};
 use clap::Args;
 use yfslam_eval::{Delta, EvalError, EvalOptions, Evaluation, StampedPose, evaluate};
+use yfslam_io::TrajectoryFile;
+
+use crate::terminal::Terminal;
 
 /// How stamps of estimate and ground truth are matched.
 #[derive(Args, Clone, Copy, Debug)]
@@ -43,6 +48,21 @@ pub fn judge(
         }
         result => result,
     }
+}
+
+/// Reads a trajectory and tells of the poses in it that cannot be used.
+///
+/// # Errors
+/// The file cannot be read or holds values that are no pose.
+pub fn read_poses(path: &Path, terminal: Terminal) -> Result<Vec<yfslam_io::StampedPose>> {
+    let TrajectoryFile { poses, duplicates_skipped, backward_skipped } = TrajectoryFile::read(path)?;
+    if duplicates_skipped + backward_skipped > 0 {
+        terminal.warn(&format!(
+            "{}: {duplicates_skipped} poses skipped because their stamp repeats, {backward_skipped} because it runs backward",
+            path.display()
+        ));
+    }
+    Ok(poses)
 }
 
 /// Poses in the type of the evaluator.

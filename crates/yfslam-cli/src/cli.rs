@@ -1,6 +1,6 @@
 //! The command line: one definition per flag, from which parsing, help and completions follow.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgAction, Args, Parser, Subcommand};
 
 use crate::command::{completions, config, demo, eval, info, run};
 
@@ -24,10 +24,10 @@ pub struct Cli {
 #[derive(Args, Clone, Copy, Debug)]
 pub struct Verbosity {
     /// Say nothing but warnings and errors.
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, display_order = 900)]
     pub quiet: bool,
     /// Say more; twice for still more.
-    #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
+    #[arg(short, long, global = true, action = ArgAction::Count, conflicts_with = "quiet", display_order = 901)]
     pub verbose: u8,
 }
 

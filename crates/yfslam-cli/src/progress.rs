@@ -22,7 +22,8 @@ pub struct Progress {
     lines: bool,
     last_line: Instant,
     rate_since: (Instant, usize),
-    fps: f64,
+    /// Unknown at first.
+    fps: Option<f64>,
 }
 
 impl Progress {
@@ -42,7 +43,7 @@ impl Progress {
             bar,
             last_line: now,
             rate_since: (now, 0),
-            fps: 0.0,
+            fps: None,
         }
     }
 
@@ -50,7 +51,7 @@ impl Progress {
     pub fn frame(&mut self, frames: &FrameTally, state: TrackingState) {
         let (since, done) = self.rate_since;
         if since.elapsed() >= RATE_OVER {
-            self.fps = (frames.total() - done) as f64 / since.elapsed().as_secs_f64();
+            self.fps = Some((frames.total() - done) as f64 / since.elapsed().as_secs_f64());
             self.rate_since = (Instant::now(), frames.total());
         }
         let message = || {
@@ -59,7 +60,8 @@ impl Progress {
                 TrackingState::Tracking => "tracking",
                 TrackingState::Lost => "lost",
             };
-            format!("{:5.1} fps  {state}  {:5.1} % tracked", self.fps, frames.tracked_percent())
+            let fps = self.fps.map_or("    -".to_owned(), |fps| format!("{fps:5.1}"));
+            format!("{fps} fps  {state}  {:5.1} % tracked", frames.tracked_percent())
         };
         if let Some(bar) = &self.bar {
             bar.set_position(frames.total() as u64);

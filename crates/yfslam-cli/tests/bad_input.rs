@@ -105,6 +105,20 @@ fn depth_without_any_measurement_is_a_skip_and_nothing_but_that_is_an_error() {
 }
 
 #[test]
+fn a_sensor_that_wakes_up_late_costs_its_blind_frames_alone() {
+    let folder = recording();
+    write_depth_png(&folder.path().join("seq/depth/blind.png"), &Image::new(320, 240)).unwrap();
+    for (kind, file) in [("rgb", "rgb/0.png"), ("depth", "depth/blind.png")] {
+        let list = folder.path().join(format!("seq/{kind}.txt"));
+        let blind: String = (0..35).map(|i| format!("-{}.5 {file}\n", 40 - i)).collect();
+        fs::write(&list, blind + &fs::read_to_string(&list).unwrap()).unwrap();
+    }
+    succeeds(folder.path(), &["run", "seq", "--method", "none", "--out", "out"]);
+    let frames = &report(&folder.path().join("out"))["frames"];
+    assert_eq!((frames["skipped"].as_u64(), frames["tracked"].as_u64()), (Some(35), Some(12)), "{frames}");
+}
+
+#[test]
 fn frames_without_features_give_no_trajectory_and_the_error_says_what_was_missing() {
     let folder = recording();
     for_each_frame(&folder, "rgb", |path| write_color_png(path, &Image::new(320, 240)).unwrap());

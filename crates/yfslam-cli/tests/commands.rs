@@ -58,7 +58,7 @@ fn info_tells_what_was_found_even_where_a_run_would_fail() {
     fs::write(folder.path().join("seq/depth/0.png"), "").unwrap();
     let text = succeeds(folder.path(), &["info", "seq"]).stdout;
     assert!(text.contains("not usable") && text.contains("raw") && text.contains("depth/0.png"), "{text}");
-    assert!(succeeds(folder.path(), &["info", SMALL_WORLD]).stdout.contains("12 at 30 Hz"));
+    assert!(succeeds(folder.path(), &["info", SMALL_WORLD]).stdout.contains("12 in 0.367 s, 30 Hz"));
 }
 
 #[test]

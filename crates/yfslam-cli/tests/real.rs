@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::fs;
+
 use common::{ate_rmse, real_data, report, succeeds};
 use serde_json::Value;
 
@@ -33,5 +35,20 @@ fn a_crowd_is_tracked_in_every_frame_within_30_mm_and_120_mb() {
     assert!(ate_rmse(&report) <= 0.030, "{}", ate_rmse(&report));
     if let Some(peak_mb) = report["peak_memory_mb"].as_f64() {
         assert!(peak_mb <= 120.0, "{peak_mb}");
+    }
+}
+
+#[test]
+fn a_crowd_with_a_network_on_its_own_thread_leaves_the_same_bytes_twice() {
+    let (Some(sequence), Some(model)) = (real_data("rgbd/bonn_crowd_dev"), real_data(MODEL)) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (sequence, model) = (sequence.to_str().unwrap(), model.to_str().unwrap());
+    for out in ["a", "b"] {
+        let args = ["run", sequence, "--detector", model, "--start", "260", "--end", "340", "--reverse", "--out", out];
+        succeeds(folder.path(), &args);
+    }
+    for name in ["trajectory.txt", "keyframes.txt", "live.txt", "map.ply"] {
+        let [a, b] = ["a", "b"].map(|out| fs::read(folder.path().join(out).join(name)).unwrap());
+        assert!(a == b, "{name} differs");
     }
 }

@@ -7,12 +7,11 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 use yfslam_eval::{
-    AlignmentKind, Delta, EvalOptions, Evaluation, RpeOptions, StampedPose, Statistics, Table, TableStyle, evaluate,
+    AlignmentKind, Delta, EvalOptions, Evaluation, RpeOptions, Statistics, Table, TableStyle, evaluate,
     improvement_percent,
 };
-use yfslam_io::TrajectoryFile;
 
-use crate::accuracy::{MatchArgs, judge, to_eval};
+use crate::accuracy::{MatchArgs, judge, read_poses, to_eval};
 use crate::terminal::{Terminal, print};
 
 const EXAMPLES: &str = "\
@@ -103,10 +102,10 @@ struct Improvement {
 }
 
 pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
-    let truth = read(&args.groundtruth, terminal)?;
+    let truth = to_eval(&read_poses(&args.groundtruth, terminal)?);
     let max_diff_ns = args.matching.max_diff_ns()?;
     let judged = |path: &Path| -> Result<Evaluation> {
-        let estimate = read(path, terminal)?;
+        let estimate = to_eval(&read_poses(path, terminal)?);
         let options = options(args, max_diff_ns);
         // A span that was asked for must be there; a default one may be missing.
         let evaluation = if args.delta.is_empty() {
@@ -137,20 +136,6 @@ fn options(args: &EvalArgs, max_diff_ns: u64) -> EvalOptions {
         rpe.all_pairs |= args.all_pairs;
     }
     options
-}
-
-fn read(path: &Path, terminal: Terminal) -> Result<Vec<StampedPose>> {
-    let file = TrajectoryFile::read(path)?;
-    let skipped = file.duplicates_skipped + file.backward_skipped;
-    if skipped > 0 {
-        terminal.warn(&format!(
-            "{}: {} poses skipped because their stamp repeats, {} because it runs backward",
-            path.display(),
-            file.duplicates_skipped,
-            file.backward_skipped
-        ));
-    }
-    Ok(to_eval(&file.poses))
 }
 
 /// The errors of an evaluation by name, in the order of its table.

@@ -12,7 +12,7 @@ use yfslam_io::sequence::{AssociationReport, FrameEntry};
 use yfslam_io::time::{format_stamp, seconds};
 use yfslam_io::{CameraSource, DepthStatistics, Sequence, TrajectoryFile};
 
-use crate::source::{SourceArgs, camera, open_sequence};
+use crate::source::{SourceArgs, camera, open_sequence, world_camera};
 use crate::terminal::{explain, print};
 
 /// Frames that are opened, evenly over the sequence.
@@ -188,22 +188,17 @@ fn truth(text: &mut String, path: &Path, sequence: &Sequence) -> Result<()> {
 }
 
 fn synthetic(args: &SourceArgs) -> Result<String> {
-    let source = args.open(false)?;
     let config = yfslam_synth::parse(&args.sequence)?;
+    let (frames, hz) = (config.frames, config.camera.fps);
+    let share_percent = 100.0 * config.person_share;
     let mut text = format!("{}\n", args.sequence);
     writeln!(
         text,
-        "frames        {} at {} Hz, rendered as they are played",
-        source.stamps_ns.len(),
-        config.camera.fps
+        "frames        {frames} in {:.3} s, {hz} Hz, rendered as they are played",
+        (frames as f64 - 1.0) / hz
     )?;
-    writeln!(
-        text,
-        "people        {}, who cover about {:.0} % of the picture",
-        config.people,
-        100.0 * config.person_share
-    )?;
-    describe_camera(&mut text, &source.camera)?;
+    writeln!(text, "people        {}, who shall cover {share_percent:.0} % of the picture", config.people)?;
+    describe_camera(&mut text, &world_camera(&config))?;
     writeln!(text, "ground truth  exact")?;
     Ok(text)
 }

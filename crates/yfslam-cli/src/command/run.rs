@@ -28,7 +28,7 @@ Examples:
   yfslam run DIR --start 100 --end 400 --reverse --overlay
 
 In the output folder:
-  trajectory.txt  all tracked frames, poses as known at the end (TUM format: t tx ty tz qx qy qz qw, world from camera)
+  trajectory.txt  all tracked frames, poses as known at the end, world from camera (TUM format)
   keyframes.txt   the keyframes of the map, likewise
   live.txt        all tracked frames, poses as known at their time
   map.ply         landmarks with colour
@@ -72,13 +72,13 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         None if config.dynamic.method == Method::None => BoxSource::None,
         None => BoxSource::Renderer,
     };
-    let mut source = args.source.open(matches!(boxes, BoxSource::Renderer))?;
-    let truth = find_truth(args, &source, terminal)?;
-    let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
-    if matches!(boxes, BoxSource::Renderer) {
+    let own_boxes = matches!(boxes, BoxSource::Renderer);
+    if own_boxes {
         terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
     }
-
+    let mut source = args.source.open(own_boxes)?;
+    let truth = find_truth(args, &source, terminal)?;
+    let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
     let pictures = args.overlay.then(|| Overlay::prepare(out.path(), config.dynamic.open_score)).transpose()?;
     let mut pipeline = Pipeline::new(&config, &source.camera.camera, detector)?;
     drive(&mut source, &mut pipeline, pictures.as_ref(), terminal)?;
@@ -125,7 +125,7 @@ fn load_detector(args: &RunArgs, config: &Config) -> Result<Option<LoadedDetecto
 
 /// A broken ground truth ends the run if it was asked for; one that merely lies in the folder is passed over.
 fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Option<Truth>> {
-    match source.truth(&args.source, args.groundtruth.as_deref()) {
+    match source.truth(&args.source, args.groundtruth.as_deref(), terminal) {
         Err(error) if args.groundtruth.is_none() => {
             terminal.warn(&format!("no evaluation: {}", explain(&error)));
             Ok(None)

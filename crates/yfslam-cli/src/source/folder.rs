@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 
 use anyhow::{Result, ensure};
-use yfslam::RgbdFrame;
+use yfslam::{Camera, RgbdFrame};
 use yfslam_io::camera::check_camera;
 use yfslam_io::decode::DecodeError;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
@@ -15,11 +15,17 @@ use yfslam_io::{
 use super::{Frames, Skip, Source, SourceArgs};
 use crate::pipeline::Stages;
 
+/// Frames of the whole sequence that are tried where the first ones are unusable.
+const PROBES: usize = 30;
+
 /// Opens the folder, finds its camera and checks both against the first frames.
 pub fn open(args: &SourceArgs) -> Result<Source> {
     let sequence = open_sequence(args)?;
     let camera = camera(args)?;
-    check_recording(&sequence, &camera.camera)?;
+    if !camera.unused_keys.is_empty() {
+        tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "not used of the camera file");
+    }
+    check(&sequence, &camera.camera)?;
     let frames = Frames::Folder(FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?);
     Ok(Source {
         name: name(args),
@@ -29,6 +35,18 @@ pub fn open(args: &SourceArgs) -> Result<Source> {
         association: Some(sequence.report),
         mirror: sequence.mirror,
     })
+}
+
+/// Checks camera and depth factor against the first frames or, where those are unusable, against frames of the whole sequence: a
+/// sensor may wake up late.
+fn check(sequence: &Sequence, camera: &Camera) -> Result<()> {
+    let Err(error) = check_recording(sequence, camera) else { return Ok(()) };
+    let step = sequence.entries.len().div_ceil(PROBES).max(1);
+    let entries = sequence.entries.iter().step_by(step).cloned().collect();
+    match (&error, check_recording(&Sequence { entries, ..sequence.clone() }, camera)) {
+        (Error::Content { .. }, Ok(_)) => Ok(()),
+        _ => Err(error.into()),
+    }
 }
 
 /// Reads the lists of the folder.

@@ -14,11 +14,13 @@ use yfslam_eval::StampedPose;
 use yfslam_io::sequence::AssociationReport;
 use yfslam_io::time::TimeMirror;
 use yfslam_io::trajectory::mirror_trajectory;
-use yfslam_io::{CameraSource, FrameStream, TrajectoryFile};
+use yfslam_io::{CameraSource, FrameStream};
 
+use crate::accuracy::{read_poses, to_eval};
 use crate::pipeline::Stages;
+use crate::terminal::Terminal;
 pub use folder::{camera, open_sequence};
-pub use synth::Renderer;
+pub use synth::{Renderer, world_camera};
 
 /// How far apart a colour and a depth image may be. Source: the tool of the TUM RGB-D benchmark.
 const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
@@ -153,7 +155,7 @@ impl Source {
     ///
     /// # Errors
     /// The file cannot be read or holds values that are no pose.
-    pub fn truth(&self, args: &SourceArgs, file: Option<&Path>) -> Result<Option<Truth>> {
+    pub fn truth(&self, args: &SourceArgs, file: Option<&Path>, terminal: Terminal) -> Result<Option<Truth>> {
         let beside = || Some(args.folder().join("groundtruth.txt")).filter(|path| path.is_file());
         let path = match (file, self.truth_of_world()) {
             (None, Some(truth)) => return Ok(Some(truth)),
@@ -163,11 +165,10 @@ impl Source {
                 None => return Ok(None),
             },
         };
-        let mut poses = TrajectoryFile::read(&path)?.poses;
+        let mut poses = read_poses(&path, terminal)?;
         if let Some(mirror) = self.mirror {
             poses = mirror_trajectory(&poses, mirror);
         }
-        let poses = poses.iter().map(|p| StampedPose::new(p.timestamp_ns, p.pose)).collect();
-        Ok(Some(Truth { origin: path.display().to_string(), poses }))
+        Ok(Some(Truth { origin: path.display().to_string(), poses: to_eval(&poses) }))
     }
 }

@@ -11,7 +11,7 @@ use yfslam::RgbdFrame;
 use yfslam_eval::StampedPose;
 use yfslam_io::CameraSource;
 use yfslam_io::time::TimeMirror;
-use yfslam_synth::World;
+use yfslam_synth::{World, WorldConfig};
 
 use super::{Frames, Source, SourceArgs, Truth};
 use crate::pipeline::Stages;
@@ -56,16 +56,17 @@ pub fn open(args: &SourceArgs, own_boxes: bool) -> Result<Source> {
     let name = name.split_once('?').map_or(name, |(name, _)| name);
     Ok(Source {
         name: if name.is_empty() { "walking_xyz".into() } else { name.into() },
-        camera: CameraSource {
-            camera: config.camera.clone(),
-            origin: "synthetic world".into(),
-            unused_keys: Vec::new(),
-        },
+        camera: world_camera(&config),
         mirror: part.mirror,
         frames: Frames::Synth(Renderer::start(world, part)?),
         stamps_ns,
         association: None,
     })
+}
+
+/// The camera of a world.
+pub fn world_camera(config: &WorldConfig) -> CameraSource {
+    CameraSource { camera: config.camera.clone(), origin: "synthetic world".into(), unused_keys: Vec::new() }
 }
 
 impl Part {
