@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::camera::Camera;
-use crate::config::Config;
+use crate::config::{Config, ConfigError};
 use crate::detection::{Detection, Detector};
 use crate::detector_thread::DetectorThread;
 use crate::dynamic::{DynamicFilter, Method, Region};
@@ -44,6 +44,9 @@ pub enum SetupError {
         /// The classes the detector has.
         known: String,
     },
+    /// A value of the configuration with which nothing can work.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
     /// A thread could not be started.
     #[error("the detector's thread could not be started: {0}")]
     Thread(#[from] std::io::Error),
@@ -129,8 +132,9 @@ impl Slam {
     /// A system without a map, for one camera. Without a detector, boxes can still come with the frames.
     ///
     /// # Errors
-    /// If the detector does not know a movable class of the configuration, or its thread cannot be started.
+    /// If the configuration holds a value that cannot work, the detector does not know a movable class, or its thread cannot be started.
     pub fn new(config: Config, camera: &Camera, detector: Option<Box<dyn Detector>>) -> Result<Self, SetupError> {
+        config.validate()?;
         let extractor = OrbExtractor::new(&config.features);
         // A method that asks for no boxes needs no detector.
         let detector = detector.filter(|_| config.dynamic.method != Method::None);
