@@ -111,3 +111,19 @@ pub(crate) const COCO_NAMES: [&str; 80] = [
     "hair drier",
     "toothbrush",
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_survive_writing_and_reading_and_unknown_keys_are_refused() {
+        let config =
+            DetectorConfig { score_threshold: 0.1, anchors: vec![vec![[1.0, 2.0]]], ..DetectorConfig::default() };
+        let text = serde_json::to_string(&config).unwrap();
+        assert_eq!(serde_json::from_str::<DetectorConfig>(&text).unwrap(), config);
+        assert_eq!(serde_json::from_str::<DetectorConfig>("{}").unwrap(), DetectorConfig::default());
+        let error = serde_json::from_str::<DetectorConfig>(r#"{"score_treshold": 0.1}"#).unwrap_err();
+        assert!(error.to_string().contains("score_treshold"), "{error}");
+    }
+}
