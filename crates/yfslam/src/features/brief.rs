@@ -13,7 +13,7 @@ use super::pattern::TEST_PAIRS;
 use crate::image::{LANES, Plane};
 
 /// Orientations for which the pattern is rotated beforehand (the paper takes 30).
-const BINS: usize = 64;
+const BINS: usize = 128;
 
 /// Largest distance of a test point from the key point, px of the level.
 pub(crate) const PATTERN_RADIUS: usize = 17;
