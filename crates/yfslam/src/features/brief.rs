@@ -13,7 +13,7 @@ use super::pattern::TEST_PAIRS;
 use crate::image::{LANES, Plane};
 
 /// Orientations for which the pattern is rotated beforehand (the paper takes 30).
-const BINS: usize = 64;
+const BINS: usize = 128;
 
 /// Largest distance of a test point from the key point, px of the level.
 pub(crate) const PATTERN_RADIUS: usize = 17;
@@ -25,7 +25,10 @@ const ROWS: usize = 2 * PATTERN_RADIUS + 1;
 const PATCH: usize = 1024;
 
 /// Bytes copied per row; each row overwrites what the one before copied too much.
-const COPIED: usize = LANES;
+const COPIED: usize = 36;
+
+/// Patches copied before the first is read: reading across several fresh writes would stall.
+const BATCH: usize = 8;
 
 /// Pixels left and right of the middle in each row of the patch: all within √½ px, the rounding, of the pattern's disc.
 const HALF_WIDTH: [usize; ROWS] = {
@@ -99,21 +102,21 @@ impl Describer {
         angles: &[f32],
         out: &mut Vec<Descriptor>,
     ) {
-        let mut patch = [0u8; PATCH + COPIED];
-        for (corner, angle_rad) in corners.iter().zip(angles) {
-            let top = (usize::from(corner.y) - PATTERN_RADIUS) * blurred.stride() + usize::from(corner.x);
-            for row in 0..ROWS {
-                let source = top + row * blurred.stride() - HALF_WIDTH[row];
-                patch[START[row]..START[row] + COPIED].copy_from_slice(&blurred.data()[source..source + COPIED]);
+        let mut patches = [[0u8; PATCH + COPIED]; BATCH];
+        for (corners, angles) in corners.chunks(BATCH).zip(angles.chunks(BATCH)) {
+            for (patch, corner) in patches.iter_mut().zip(corners) {
+                let top = (usize::from(corner.y) - PATTERN_RADIUS) * blurred.stride() + usize::from(corner.x);
+                for row in 0..ROWS {
+                    let source = top + row * blurred.stride() - HALF_WIDTH[row];
+                    patch[START[row]..START[row] + COPIED].copy_from_slice(&blurred.data()[source..source + COPIED]);
+                }
             }
-            let bin = (angle_rad * (BINS as f32 / TAU) + 0.5) as usize % BINS;
-            let pattern = &self.patterns[bin];
-            // A vector as wide as that finds bytes faster than memory does.
-            out.push(if S::u8s::LEN == 64 {
-                compare_wide(simd, &patch, pattern)
-            } else {
-                compare(simd, &patch, pattern)
-            });
+            for (patch, angle_rad) in patches.iter().zip(angles) {
+                let pattern = &self.patterns[(angle_rad * (BINS as f32 / TAU) + 0.5) as usize % BINS];
+                // A vector as wide as that finds bytes faster than memory does.
+                let wide = S::u8s::LEN == 64;
+                out.push(if wide { compare_wide(simd, patch, pattern) } else { compare(simd, patch, pattern) });
+            }
         }
     }
 }
