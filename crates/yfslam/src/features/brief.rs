@@ -10,7 +10,7 @@ use fearless_simd::{Level, dispatch, prelude::*, u8x64};
 use super::Descriptor;
 use super::fast::Corner;
 use super::pattern::TEST_PAIRS;
-use crate::image::{LANES, Plane};
+use crate::image::Plane;
 
 /// Orientations for which the pattern is rotated beforehand (the paper takes 30).
 const BINS: usize = 128;
