@@ -185,7 +185,8 @@ impl Slam {
         self.collect_boxes(frame, detecting);
         times.detector_wait = clock.lap();
         let features = &mut self.tracker.current.features;
-        self.filter.before_pose(&self.config.dynamic, &self.movable, &frame.depth, features);
+        let scales = &self.sensor.scale_factors;
+        self.filter.before_pose(&self.config.dynamic, &self.movable, &frame.depth, features, scales);
         times.dynamic = clock.lap();
         let tracked = match self.state {
             TrackingState::NotInitialized => self.has_enough_to_start(),

@@ -57,13 +57,14 @@ impl DynamicFilter {
     }
 
     /// Sets the trust of `features` from what boxes and depth tell, before the pose is known. `movable` are this frame's boxes of
-    /// movable objects at any score.
+    /// movable objects at any score, `scale_factors` those of the pyramid's levels.
     pub fn before_pose(
         &mut self,
         config: &DynamicConfig,
         movable: &[Detection],
         depth: &DepthImage,
         features: &mut FrameFeatures,
+        scale_factors: &[f32],
     ) {
         self.regions.clear();
         match config.method {
@@ -75,7 +76,7 @@ impl DynamicFilter {
                 self.groups.regions(config, &mut self.tracks, depth, features, &mut self.regions);
             }
         }
-        apply(config, &mut self.regions, depth, features);
+        apply(config, &mut self.regions, depth, features, scale_factors);
     }
 
     /// The parts of the last frame that were found to move.
@@ -92,12 +93,19 @@ impl DynamicFilter {
 
 /// Distrusts the features of all regions. If that leaves too few, the regions of least confidence are given up one by one: a false box
 /// must not take the ground from under tracking.
-fn apply(config: &DynamicConfig, regions: &mut Vec<Region>, depth: &DepthImage, features: &mut FrameFeatures) {
+fn apply(
+    config: &DynamicConfig,
+    regions: &mut Vec<Region>,
+    depth: &DepthImage,
+    features: &mut FrameFeatures,
+    scale_factors: &[f32],
+) {
     regions.sort_by(|a, b| b.score.total_cmp(&a.score));
     loop {
         let mut trusted = 0;
         for f in &mut features.features {
-            let moving = regions.iter().any(|r| r.covers(config, depth, f.raw, f.octave));
+            let scale = scale_factors.get(usize::from(f.octave)).copied().unwrap_or(1.0);
+            let moving = regions.iter().any(|r| r.covers(depth, f.raw, config.edge_px * scale));
             f.trust = if moving { 0.0 } else { 1.0 };
             trusted += usize::from(!moving);
         }
@@ -109,8 +117,8 @@ fn apply(config: &DynamicConfig, regions: &mut Vec<Region>, depth: &DepthImage, 
 
 impl Region {
     /// Whether a feature at a raw position belongs to the moving body: inside the box, at the body's depth or without depth, or with the
-    /// body within reach of its patch.
-    fn covers(&self, config: &DynamicConfig, depth: &DepthImage, raw: [f32; 2], octave: u8) -> bool {
+    /// body within `edge_px` of it.
+    fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
         let [x, y] = raw;
         if !self.bbox.contains(x, y) {
             return false;
@@ -122,8 +130,7 @@ impl Region {
             return true;
         }
         // A corner on the outline belongs to neither side: its descriptor sees both.
-        let r = config.edge_px * 1.2f32.powi(i32::from(octave));
-        let h = r * std::f32::consts::FRAC_1_SQRT_2;
+        let (r, h) = (edge_px, edge_px * std::f32::consts::FRAC_1_SQRT_2);
         [(r, 0.0), (-r, 0.0), (0.0, r), (0.0, -r), (h, h), (h, -h), (-h, h), (-h, -h)]
             .iter()
             .any(|&(dx, dy)| at(dx, dy).is_some_and(moves))
