@@ -48,7 +48,7 @@ pub struct RunArgs {
     settings: SettingsArgs,
     #[command(flatten)]
     detector: DetectorArgs,
-    /// Where results go [default: yfslam-out/<name of the sequence>].
+    /// Where results go [default: yfslam-out/NAME, the name of the sequence].
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: Option<PathBuf>,
     /// Write a picture of each frame: boxes yellow, moving regions red, static features green, dynamic ones red.
