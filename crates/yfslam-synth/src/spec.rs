@@ -5,7 +5,7 @@
 use crate::config::{Activity, CameraMotion, SensorConfig, WorldConfig, WorldError};
 
 /// Keys of a spec and what they set.
-const KEYS: [(&str, &str); 11] = [
+const KEYS: &[(&str, &str)] = &[
     ("seed", "integer"),
     ("people", "0 to 6"),
     ("frames", "number of frames"),
