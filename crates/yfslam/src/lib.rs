@@ -20,6 +20,7 @@
 //! | [`dynamic`] | how far a feature may be trusted to be static; nothing else knows that people exist |
 //! | [`tracking`] | the pose of each frame; when to make a keyframe |
 //! | [`mapping`] | growth and refinement of the map |
+//! | [`loops`] | places seen before: the way back when lost, and loops to close |
 //! | [`system`] | the whole path |
 //!
 //! Frames are named: `t_cam_world` maps points of the world into the camera. Lengths are metres, times integer nanoseconds. The same
@@ -57,6 +58,7 @@ pub mod features;
 pub mod frame;
 pub mod geometry;
 pub mod image;
+pub mod loops;
 pub mod map;
 pub mod mapping;
 pub mod optimize;

@@ -11,6 +11,7 @@ use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
 use crate::image::{GrayImage, gray_from_rgb};
+use crate::loops::{LoopClosed, PlaceMemory};
 use crate::map::{KeyFrameId, Map};
 use crate::mapping::Mapper;
 use crate::sensor::SensorModel;
@@ -29,6 +30,8 @@ pub struct Tracked {
     pub is_keyframe: bool,
     /// Landmarks that fit the pose.
     pub inliers: usize,
+    /// The loop that the keyframe closed: poses before may have changed.
+    pub loop_closed: Option<LoopClosed>,
     /// Where the time went.
     pub times: StageTimes,
 }
@@ -96,6 +99,8 @@ pub struct StageTimes {
     pub tracking: Duration,
     /// Keyframe insertion and local bundle adjustment; zero for frames that are no keyframe.
     pub mapping: Duration,
+    /// Place recognition: loops for keyframes, the way back for frames that are lost.
+    pub places: Duration,
 }
 
 /// Where a tracked frame hangs in the map.
@@ -115,6 +120,7 @@ pub struct Slam {
     extracted: Features,
     tracker: Tracker,
     mapper: Mapper,
+    places: PlaceMemory,
     map: Map,
     state: TrackingState,
     anchors: Vec<Anchor>,
@@ -165,6 +171,7 @@ impl Slam {
             extracted: Features::default(),
             tracker: Tracker::default(),
             mapper: Mapper::default(),
+            places: PlaceMemory::default(),
             map: Map::default(),
             state: TrackingState::NotInitialized,
             anchors: Vec::new(),
@@ -190,9 +197,18 @@ impl Slam {
         times.dynamic = clock.lap();
         let tracked = match self.state {
             TrackingState::NotInitialized => self.has_enough_to_start(),
-            TrackingState::Tracking | TrackingState::Lost => {
+            TrackingState::Tracking => {
+                let min_inliers = self.config.tracking.local_min_inliers;
                 self.tracker.estimate(&self.sensor, &self.config, &self.map)
-                    && self.tracker.track_local_map(&self.sensor, &self.config, &mut self.map)
+                    && self.tracker.track_local_map(&self.sensor, &self.config, &mut self.map, min_inliers)
+            }
+            TrackingState::Lost => {
+                let frame = &mut self.tracker.current;
+                let found = self.places.relocalise(&self.sensor, &self.config, &self.map, frame);
+                times.places = clock.lap();
+                // Whoever was lost has to be surer than whoever was not.
+                let min_inliers = self.config.places.relocalise_min_inliers;
+                found && self.tracker.track_local_map(&self.sensor, &self.config, &mut self.map, min_inliers)
             }
         };
         if tracked {
@@ -201,12 +217,18 @@ impl Slam {
             self.tracker.reject();
         }
         times.tracking = clock.lap();
+        let mut loop_closed = None;
         let is_keyframe = tracked && self.tracker.wants_keyframe(&self.sensor, &self.config, &self.map);
         if is_keyframe {
             let current = &self.tracker.current;
             let keyframe = self.mapper.insert(&self.sensor, &self.config, &mut self.map, current, &frame.color);
-            self.tracker.became_keyframe(keyframe, &self.map);
             times.mapping = clock.lap();
+            self.places.learn(&self.map, keyframe);
+            if self.config.loops.enabled {
+                loop_closed = self.places.close_loop(&self.sensor, &self.config, &mut self.map, keyframe);
+            }
+            self.tracker.became_keyframe(keyframe, &self.map);
+            times.places += clock.lap();
         }
         self.state = match (tracked, self.state) {
             (true, _) => TrackingState::Tracking,
@@ -221,6 +243,7 @@ impl Slam {
             t_world_cam: tracked.then(|| self.tracker.current.t_cam_world.inverse()),
             is_keyframe,
             inliers: self.tracker.inliers,
+            loop_closed,
             times,
         })
     }
@@ -308,6 +331,7 @@ impl Slam {
         self.anchors.clear();
         self.tracker.reset();
         self.mapper.reset();
+        self.places.reset();
         self.resets += 1;
         TrackingState::NotInitialized
     }

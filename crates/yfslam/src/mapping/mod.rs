@@ -5,7 +5,7 @@
 
 mod cull;
 mod depth;
-mod fuse;
+pub(crate) mod fuse;
 mod triangulate;
 mod window;
 

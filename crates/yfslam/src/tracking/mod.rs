@@ -99,8 +99,15 @@ impl Tracker {
             && self.current.refine_pose(sensor, &config.pose) >= c.motion_min_inliers
     }
 
-    /// Matches the local map and refines the pose with all of it. Returns whether the frame is tracked.
-    pub fn track_local_map(&mut self, sensor: &SensorModel, config: &Config, map: &mut Map) -> bool {
+    /// Matches the local map and refines the pose with all of it. Returns whether the frame is tracked: at least `min_inliers`
+    /// landmarks fit.
+    pub fn track_local_map(
+        &mut self,
+        sensor: &SensorModel,
+        config: &Config,
+        map: &mut Map,
+        min_inliers: usize,
+    ) -> bool {
         let c = &config.tracking;
         for sight in &mut self.current.sights {
             // Borrowed points have done their work: the refined pose rests on the map alone.
@@ -126,7 +133,7 @@ impl Tracker {
                 map.count_found(id);
             }
         }
-        self.inliers >= c.local_min_inliers
+        self.inliers >= min_inliers
     }
 
     /// Ends a tracked frame: ties it to its reference and learns the motion.
