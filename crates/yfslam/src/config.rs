@@ -399,8 +399,8 @@ impl Config {
             (
                 "features.scale_factor",
                 f.scale_factor.to_string(),
-                f.scale_factor > 1.0 && f.scale_factor <= 4.0,
-                "above 1, at most 4",
+                f.scale_factor > 1.0 && f.scale_factor <= 2.0,
+                "above 1, at most 2",
             ),
             ("features.cell_px", f.cell_px.to_string(), f.cell_px > 0, "at least 1 px"),
             (

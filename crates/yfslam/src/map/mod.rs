@@ -11,6 +11,8 @@
 mod keyframe;
 mod landmark;
 pub mod ops;
+pub mod persist;
+mod restore;
 
 use std::collections::BTreeMap;
 
