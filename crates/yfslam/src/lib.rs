@@ -70,4 +70,4 @@ pub use camera::Camera;
 pub use config::Config;
 pub use detection::{BoundingBox, Detection, Detector, DetectorError};
 pub use frame::RgbdFrame;
-pub use system::{FrameRejected, SetupError, Slam, Tracked};
+pub use system::{FrameRejected, MapUse, SetupError, Slam, Tracked};

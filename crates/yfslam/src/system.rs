@@ -12,6 +12,7 @@ use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
 use crate::image::{GrayImage, gray_from_rgb};
 use crate::loops::{LoopClosed, PlaceMemory};
+use crate::map::persist::{MapError, SavedMap, encode};
 use crate::map::{KeyFrameId, Map};
 use crate::mapping::Mapper;
 use crate::sensor::SensorModel;
@@ -50,6 +51,26 @@ pub enum SetupError {
     /// A value of the configuration with which nothing can work.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// A map made with other feature settings.
+    #[error(
+        "the map was made with {found} pyramid levels of scale {found_scale}, the configuration has {wanted} of {wanted_scale}: \
+         set features.levels and features.scale_factor to the map's"
+    )]
+    MapFeatures {
+        /// Levels of the map's features.
+        found: usize,
+        /// Their scale factor.
+        found_scale: f32,
+        /// Levels configured.
+        wanted: usize,
+        /// Scale factor configured.
+        wanted_scale: f32,
+    },
+    /// A map made with another camera, which can be localised in but not extended.
+    #[error(
+        "the map was made with another camera ({0} px wide, fx {1}): use its calibration, or localise in the map instead of extending it"
+    )]
+    MapCamera(usize, f64),
     /// A thread could not be started.
     #[error("the detector's thread could not be started: {0}")]
     Thread(#[from] std::io::Error),
@@ -103,6 +124,15 @@ pub struct StageTimes {
     pub places: Duration,
 }
 
+/// What becomes of a map from an earlier session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapUse {
+    /// It grows and is refined, once the camera has recognised where it is.
+    Extend,
+    /// It stays as it is; the camera is localised in it.
+    Localise,
+}
+
 /// Where a tracked frame hangs in the map.
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
@@ -132,6 +162,10 @@ pub struct Slam {
     detector_failures: usize,
     last_timestamp_ns: Option<i64>,
     resets: usize,
+    /// How a map from an earlier session is used; `None` if the map is all of this one.
+    map_use: Option<MapUse>,
+    /// Sequence number of the first keyframe of this session.
+    first_keyframe: u64,
 }
 
 impl Slam {
@@ -164,6 +198,8 @@ impl Slam {
             detector_failures: 0,
             last_timestamp_ns: None,
             resets: 0,
+            map_use: None,
+            first_keyframe: 0,
             sensor: SensorModel::new(camera, &config, extractor.scale_factors()),
             config,
             extractor,
@@ -176,6 +212,34 @@ impl Slam {
             state: TrackingState::NotInitialized,
             anchors: Vec::new(),
         })
+    }
+
+    /// The system in a map from an earlier session: lost, until a frame is recognised.
+    ///
+    /// # Errors
+    /// If the map's features were found with other settings, or it is to be extended with another camera.
+    pub fn with_map(mut self, saved: SavedMap, map_use: MapUse) -> Result<Self, SetupError> {
+        let (found, wanted) = (&saved.features, &self.config.features);
+        if (found.levels, found.scale_factor) != (wanted.levels, wanted.scale_factor) {
+            return Err(SetupError::MapFeatures {
+                found: found.levels,
+                found_scale: found.scale_factor,
+                wanted: wanted.levels,
+                wanted_scale: wanted.scale_factor,
+            });
+        }
+        if map_use == MapUse::Extend && saved.camera != self.sensor.camera {
+            return Err(SetupError::MapCamera(saved.camera.width, saved.camera.fx));
+        }
+        self.map = saved.map;
+        let ids: Vec<KeyFrameId> = self.map.keyframes().map(|(id, _)| id).collect();
+        for id in ids {
+            self.places.learn(&self.map, id);
+        }
+        self.first_keyframe = self.map.keyframes_ever();
+        self.map_use = Some(map_use);
+        self.state = TrackingState::Lost;
+        Ok(self)
     }
 
     /// Takes one frame through all stages.
@@ -218,7 +282,9 @@ impl Slam {
         }
         times.tracking = clock.lap();
         let mut loop_closed = None;
-        let is_keyframe = tracked && self.tracker.wants_keyframe(&self.sensor, &self.config, &self.map);
+        let is_keyframe = tracked
+            && self.map_use != Some(MapUse::Localise)
+            && self.tracker.wants_keyframe(&self.sensor, &self.config, &self.map);
         if is_keyframe {
             let current = &self.tracker.current;
             let keyframe = self.mapper.insert(&self.sensor, &self.config, &mut self.map, current, &frame.color);
@@ -233,7 +299,7 @@ impl Slam {
         self.state = match (tracked, self.state) {
             (true, _) => TrackingState::Tracking,
             (false, TrackingState::NotInitialized) => TrackingState::NotInitialized,
-            (false, _) if self.map.keyframe_count() <= self.config.tracking.reset_max_keyframes => self.reset(),
+            (false, _) if self.is_map_worthless() => self.reset(),
             (false, _) => TrackingState::Lost,
         };
         self.note_anchor(frame.timestamp_ns);
@@ -323,8 +389,12 @@ impl Slam {
             && with_depth >= self.config.tracking.init_min_landmarks
     }
 
-    /// Throws the map away and starts over with the next frame: a map this young is worth less than a fresh start (ORB-SLAM2). The poses
-    /// that hung on it go with it.
+    /// Whether a fresh start is worth more than the map (ORB-SLAM2): it is young, and all of this session.
+    fn is_map_worthless(&self) -> bool {
+        self.map_use.is_none() && self.map.keyframe_count() <= self.config.tracking.reset_max_keyframes
+    }
+
+    /// Throws the map away and starts over with the next frame. The poses that hung on it go with it.
     fn reset(&mut self) -> TrackingState {
         tracing::warn!(keyframes = self.map.keyframe_count(), "lost soon after the start: the map is begun anew");
         self.map = Map::default();
@@ -378,6 +448,19 @@ impl Slam {
     /// The parts of the last frame that were found to move.
     pub fn moving_regions(&self) -> &[Region] {
         self.filter.regions()
+    }
+
+    /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
+    pub fn first_keyframe(&self) -> u64 {
+        self.first_keyframe
+    }
+
+    /// The map as bytes, for [`crate::map::persist::decode`].
+    ///
+    /// # Errors
+    /// If it cannot be written, which would be a fault of this program.
+    pub fn save_map(&self) -> Result<Vec<u8>, MapError> {
+        encode(&self.map, &self.sensor.camera, &self.config.features)
     }
 
     /// The map.
