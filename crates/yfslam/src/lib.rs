@@ -21,6 +21,7 @@
 //! | [`tracking`] | the pose of each frame; when to make a keyframe |
 //! | [`mapping`] | growth and refinement of the map |
 //! | [`loops`] | places seen before: the way back when lost, and loops to close |
+//! | [`backend`] | the owner of the map, on the calling thread or its own |
 //! | [`system`] | the whole path |
 //!
 //! Frames are named: `t_cam_world` maps points of the world into the camera. Lengths are metres, times integer nanoseconds. The same
@@ -49,6 +50,7 @@
 //! ```
 #![warn(missing_docs)]
 
+pub mod backend;
 pub mod camera;
 pub mod config;
 pub mod detection;
@@ -66,6 +68,7 @@ pub mod sensor;
 pub mod system;
 pub mod tracking;
 
+pub use backend::Execution;
 pub use camera::Camera;
 pub use config::Config;
 pub use detection::{BoundingBox, Detection, Detector, DetectorError};

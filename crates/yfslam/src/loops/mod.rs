@@ -13,13 +13,17 @@ mod index;
 mod recognise;
 mod verify;
 
+use std::sync::{Mutex, PoisonError};
+
+use slotmap::SecondaryMap;
+
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::map::{KeyFrameId, Map};
 use crate::sensor::SensorModel;
 use crate::tracking::TrackedFrame;
-use recognise::{Candidate, Recogniser};
-use slotmap::SecondaryMap;
+use recognise::Candidate;
+pub use recognise::Recogniser;
 
 /// A loop that was closed.
 #[derive(Clone, Copy, Debug)]
@@ -34,10 +38,22 @@ pub struct LoopClosed {
     pub drift: Pose,
 }
 
-/// Recognises places, finds the way back, closes loops.
+/// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then.
+pub fn relocalise(
+    recogniser: &mut Recogniser,
+    sensor: &SensorModel,
+    config: &Config,
+    map: &Map,
+    frame: &mut TrackedFrame,
+) -> bool {
+    let c = &config.places;
+    let candidates = recogniser.candidates(c, map, &frame.features, |_| true);
+    candidates.iter().any(|place| verify::locate(sensor, config, map, place, frame, c.relocalise_min_inliers).is_some())
+}
+
+/// Closes loops.
 #[derive(Clone, Debug, Default)]
-pub struct PlaceMemory {
-    recogniser: Recogniser,
+pub struct LoopCloser {
     /// Places that the last keyframe resembled, with the number of keyframes in a row that agreed.
     consistent: Vec<(Vec<KeyFrameId>, usize)>,
     /// Sequence number of the keyframe that closed the last loop.
@@ -45,47 +61,32 @@ pub struct PlaceMemory {
     frame: TrackedFrame,
 }
 
-impl PlaceMemory {
-    /// Takes the landmarks of a keyframe in, so that the place is known again.
-    pub fn learn(&mut self, map: &Map, keyframe: KeyFrameId) {
-        self.recogniser.learn(map, keyframe);
-    }
-
-    /// Forgets everything.
+impl LoopCloser {
+    /// Forgets all places and loops.
     pub fn reset(&mut self) {
-        self.recogniser.reset();
         self.consistent.clear();
         self.last_loop = None;
     }
 
-    /// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then.
-    pub fn relocalise(&mut self, sensor: &SensorModel, config: &Config, map: &Map, frame: &mut TrackedFrame) -> bool {
-        let c = &config.places;
-        let candidates = self.recogniser.candidates(c, map, &frame.features, |_| true);
-        candidates
-            .iter()
-            .any(|place| verify::locate(sensor, config, map, place, frame, c.relocalise_min_inliers).is_some())
-    }
-
     /// Looks whether a new keyframe shows an old place, and closes the loop if so.
-    pub fn close_loop(
+    pub fn close(
         &mut self,
         sensor: &SensorModel,
         config: &Config,
+        recogniser: &Mutex<Recogniser>,
         map: &mut Map,
         keyframe: KeyFrameId,
     ) -> Option<LoopClosed> {
         let k = map.keyframe(keyframe)?;
-        if self.last_loop.is_some_and(|last| k.sequence < last + config.loops.min_keyframes_between) {
+        let (sequence, estimated) = (k.sequence, k.t_cam_world);
+        if self.last_loop.is_some_and(|last| sequence < last + config.loops.min_keyframes_between) {
             self.consistent.clear();
             return None;
         }
-        let sequence = k.sequence;
-        let candidates = self.old_places(config, map, keyframe);
+        self.frame.features.clone_from(&k.features);
+        let candidates =
+            old_places(&mut recogniser.lock().unwrap_or_else(PoisonError::into_inner), config, map, keyframe);
         for place in self.consistent_ones(config, candidates) {
-            let k = map.keyframe(keyframe)?;
-            self.frame.features.clone_from(&k.features);
-            let estimated = k.t_cam_world;
             let found = verify::locate(sensor, config, map, &place, &mut self.frame, config.loops.min_inliers);
             let Some(inliers) = found else { continue };
             let drift = estimated * self.frame.t_cam_world.inverse();
@@ -95,19 +96,6 @@ impl PlaceMemory {
             return Some(LoopClosed { keyframe, to: place.keyframe, inliers, drift });
         }
         None
-    }
-
-    /// Places that resemble the keyframe and are not those it is connected with anyway.
-    fn old_places(&mut self, config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<Candidate> {
-        let Some(k) = map.keyframe(keyframe) else { return Vec::new() };
-        let near: Vec<KeyFrameId> = std::iter::once(keyframe).chain(k.covisible.iter().map(|(id, _)| *id)).collect();
-        let mut local = SecondaryMap::new();
-        for (_, landmark) in near.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.sights()) {
-            local.insert(landmark, ());
-        }
-        let mut candidates = self.recogniser.candidates(&config.places, map, &k.features, |id| !local.contains_key(id));
-        candidates.retain(|place| !near.contains(&place.keyframe));
-        candidates
     }
 
     /// Those candidates that the last keyframes agreed on: a candidate agrees with an earlier one if their groups overlap.
@@ -125,4 +113,17 @@ impl PlaceMemory {
         }
         chosen
     }
+}
+
+/// Places that resemble the keyframe and are not those it is connected with anyway.
+fn old_places(recogniser: &mut Recogniser, config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<Candidate> {
+    let Some(k) = map.keyframe(keyframe) else { return Vec::new() };
+    let near: Vec<KeyFrameId> = std::iter::once(keyframe).chain(k.covisible.iter().map(|(id, _)| *id)).collect();
+    let mut local = SecondaryMap::new();
+    for (_, landmark) in near.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.sights()) {
+        local.insert(landmark, ());
+    }
+    let mut candidates = recogniser.candidates(&config.places, map, &k.features, |id| !local.contains_key(id));
+    candidates.retain(|place| !near.contains(&place.keyframe));
+    candidates
 }
