@@ -18,9 +18,11 @@
 //! # }
 //! ```
 
+mod bake;
 mod bvh;
 mod camera_path;
 mod config;
+mod flicker;
 mod light;
 mod mesh;
 mod people;
@@ -29,7 +31,9 @@ mod rng;
 mod scene;
 mod sensor;
 mod spec;
+mod surfaces;
 mod texture;
+mod tour;
 mod world;
 
 pub use config::{

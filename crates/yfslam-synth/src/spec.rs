@@ -2,10 +2,13 @@
 //!
 //! In: the text. Out: a [`WorldConfig`], or an error that lists what would be right.
 
-use crate::config::{Activity, CameraMotion, SensorConfig, WorldConfig, WorldError};
+use crate::config::{Activity, CameraMotion, SceneKind, SensorConfig, WorldConfig, WorldError};
 
 /// Keys of a spec and what they set.
 const KEYS: &[(&str, &str)] = &[
+    ("scene", "office, rescue, corridor or lab"),
+    ("motion", "static, xyz, rpy, halfsphere, drive or loop"),
+    ("activity", "sitting or walking"),
     ("seed", "integer"),
     ("people", "0 to 6"),
     ("frames", "number of frames"),
@@ -17,6 +20,8 @@ const KEYS: &[(&str, &str)] = &[
     ("noise", "on or off"),
     ("boxes", "on or off: exact person boxes as detections"),
     ("shadows", "on or off"),
+    ("exposure", "brightness of the picture, 1 is normal"),
+    ("flicker", "changing light, 0 to 1"),
 ];
 
 /// Whether `text` is meant as a synthetic world (it starts with `synth:`).
@@ -61,6 +66,9 @@ fn find(name: &str) -> Option<(Activity, CameraMotion)> {
 fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
     let camera = &mut config.camera;
     match key {
+        "scene" => config.scene = one_of(key, value, &SceneKind::ALL)?,
+        "motion" => config.motion = one_of(key, value, &CameraMotion::ALL)?,
+        "activity" => config.activity = one_of(key, value, &Activity::ALL)?,
         "seed" => config.seed = number(key, value)?,
         "people" => config.people = number(key, value)?,
         "frames" => config.frames = number(key, value)?,
@@ -88,6 +96,8 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
         }
         "boxes" => config.detections = switch(key, value)?,
         "shadows" => config.light.moving_shadows = switch(key, value)?,
+        "exposure" => config.light.exposure = number(key, value)?,
+        "flicker" => config.light.flicker = number(key, value)?,
         _ => {
             let keys: Vec<String> = KEYS.iter().map(|(key, meaning)| format!("{key} ({meaning})")).collect();
             return Err(format!("unknown key `{key}`; the keys are {}", keys.join(", ")));
@@ -99,6 +109,13 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
 fn number<T: std::str::FromStr>(key: &str, value: &str) -> Result<T, String> {
     let meaning = KEYS.iter().find(|(k, _)| *k == key).map_or("number", |(_, meaning)| meaning);
     value.parse().map_err(|_| format!("`{key}={value}`: `{value}` cannot be read as {meaning}"))
+}
+
+/// The variant named `value`.
+fn one_of<T: Copy>(key: &str, value: &str, all: &[(&str, T)]) -> Result<T, String> {
+    let names = || all.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let found = all.iter().find(|(name, _)| *name == value);
+    found.map(|&(_, variant)| variant).ok_or_else(|| format!("`{key}={value}`: use one of {}", names()))
 }
 
 fn switch(key: &str, value: &str) -> Result<bool, String> {
@@ -130,8 +147,21 @@ mod tests {
     }
 
     #[test]
+    fn scene_motion_activity_and_light_are_keys_too() {
+        let config =
+            parse("synth:walking_xyz?scene=lab&motion=drive&activity=sitting&exposure=0.3&flicker=0.5").unwrap();
+        assert_eq!(
+            (config.scene, config.motion, config.activity),
+            (SceneKind::Lab, CameraMotion::Drive, Activity::Sitting)
+        );
+        assert_eq!((config.light.exposure, config.light.flicker), (0.3, 0.5));
+        assert!(message("synth:?scene=attic").contains("use one of office, rescue, corridor, lab"));
+        assert!(message("synth:?flicker=2").contains("between 0 and 1"));
+    }
+
+    #[test]
     fn every_listed_name_parses() {
-        assert_eq!(names().len(), 8);
+        assert_eq!(names().len(), 12);
         for name in names() {
             parse(&format!("synth:{name}")).unwrap();
         }
