@@ -2,7 +2,10 @@
 //!
 //! In: the text. Out: a [`WorldConfig`], or an error that lists what would be right.
 
-use crate::config::{Activity, CameraMotion, SensorConfig, WorldConfig, WorldError};
+use yfslam::Camera;
+
+use crate::config::{SensorConfig, WorldConfig, WorldError, default_camera};
+use crate::suite::{DEFAULT_NAME, find, names};
 
 /// Keys of a spec and what they set.
 const KEYS: &[(&str, &str)] = &[
@@ -24,10 +27,11 @@ pub fn is_spec(text: &str) -> bool {
     text.starts_with("synth:")
 }
 
-/// Names of all worlds: `sitting` or `walking`, then the camera's motion.
-pub fn names() -> Vec<String> {
-    let pairs = Activity::ALL.iter().flat_map(|(a, _)| CameraMotion::ALL.iter().map(move |(m, _)| format!("{a}_{m}")));
-    pairs.collect()
+/// The name in a spec, and what follows its question mark.
+pub fn split(spec: &str) -> (&str, &str) {
+    let text = spec.strip_prefix("synth:").unwrap_or(spec);
+    let (name, query) = text.split_once('?').unwrap_or((text, ""));
+    (if name.is_empty() { DEFAULT_NAME } else { name }, query)
 }
 
 /// Reads a spec; the prefix `synth:` may be left out, an empty name means `walking_xyz`.
@@ -35,13 +39,20 @@ pub fn names() -> Vec<String> {
 /// # Errors
 /// If the name or a key is unknown, or a value cannot be read or is out of range. The message lists the valid names.
 pub fn parse(spec: &str) -> Result<WorldConfig, WorldError> {
+    parse_with_camera(spec, default_camera())
+}
+
+/// Reads a spec for another camera than the default; `width`, `height` and `fps` in the spec change that camera.
+///
+/// # Errors
+/// As for [`parse`], also if `camera` is none that can be rendered.
+pub fn parse_with_camera(spec: &str, camera: Camera) -> Result<WorldConfig, WorldError> {
     let fail = |reason: String| WorldError::Spec { spec: spec.to_owned(), reason };
-    let text = spec.strip_prefix("synth:").unwrap_or(spec);
-    let (name, query) = text.split_once('?').unwrap_or((text, ""));
-    let name = if name.is_empty() { "walking_xyz" } else { name };
-    let mut config = WorldConfig::default();
-    (config.activity, config.motion) =
+    let (name, query) = split(spec);
+    let mut config = WorldConfig { camera, ..WorldConfig::default() };
+    let world =
         find(name).ok_or_else(|| fail(format!("unknown world `{name}`; the worlds are {}", names().join(", "))))?;
+    world.apply(&mut config);
     for pair in query.split('&').filter(|pair| !pair.is_empty()) {
         let (key, value) =
             pair.split_once('=').ok_or_else(|| fail(format!("`{pair}` is not of the form key=value")))?;
@@ -49,13 +60,6 @@ pub fn parse(spec: &str) -> Result<WorldConfig, WorldError> {
     }
     config.validate().map_err(|error| fail(error.to_string()))?;
     Ok(config)
-}
-
-fn find(name: &str) -> Option<(Activity, CameraMotion)> {
-    let (activity, motion) = name.split_once('_')?;
-    let (_, activity) = *Activity::ALL.iter().find(|(n, _)| *n == activity)?;
-    let (_, motion) = *CameraMotion::ALL.iter().find(|(n, _)| *n == motion)?;
-    Some((activity, motion))
 }
 
 fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
@@ -112,6 +116,7 @@ fn switch(key: &str, value: &str) -> Result<bool, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::{Activity, CameraMotion};
 
     fn message(spec: &str) -> String {
         parse(spec).unwrap_err().to_string()
@@ -131,7 +136,6 @@ mod tests {
 
     #[test]
     fn every_listed_name_parses() {
-        assert_eq!(names().len(), 8);
         for name in names() {
             parse(&format!("synth:{name}")).unwrap();
         }
