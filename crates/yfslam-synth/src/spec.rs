@@ -17,7 +17,11 @@ const KEYS: &[(&str, &str)] = &[
     ("height", "px"),
     ("fps", "frames per second"),
     ("shake", "hand shake, 1 is natural"),
-    ("noise", "on or off"),
+    ("noise", "on or off: off is the perfect sensor, without any of the effects below"),
+    ("blur", "ms for which the shutter is open; 0 is off"),
+    ("autoexposure", "on or off"),
+    ("offset_ms", "ms from the colour image to its depth image, such as 12; 0 is off"),
+    ("holes", "on or off: places without depth at edges, on grazing and on dark surfaces"),
     ("boxes", "on or off: exact person boxes as detections"),
     ("shadows", "on or off"),
 ];
@@ -90,6 +94,17 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
                 config.sensor = SensorConfig::perfect();
             }
         }
+        "blur" => config.sensor.exposure_s = 1e-3 * number::<f64>(key, value)?,
+        "offset_ms" => config.sensor.depth_offset_s = 1e-3 * number::<f64>(key, value)?,
+        "autoexposure" => {
+            let adapts = switch(key, value)?;
+            config.sensor.auto_exposure = if adapts { SensorConfig::default().auto_exposure } else { 0.0 };
+        }
+        "holes" => {
+            let from = if switch(key, value)? { SensorConfig::default() } else { SensorConfig::perfect() };
+            let sensor = &mut config.sensor;
+            (sensor.holes, sensor.max_angle_deg, sensor.min_return) = (from.holes, from.max_angle_deg, from.min_return);
+        }
         "boxes" => config.detections = switch(key, value)?,
         "shadows" => config.light.moving_shadows = switch(key, value)?,
         _ => {
@@ -132,6 +147,18 @@ mod tests {
         assert!((config.camera.fx - 267.7).abs() < 1e-9 && (config.camera.cx - 159.8).abs() < 1e-9);
         assert_eq!(config.sensor, SensorConfig::perfect());
         assert!(config.detections);
+    }
+
+    #[test]
+    fn each_effect_of_the_sensor_has_its_switch() {
+        let off = parse("walking_xyz?blur=0&autoexposure=off&holes=off").unwrap().sensor;
+        assert_eq!((off.exposure_s, off.auto_exposure), (0.0, 0.0));
+        assert_eq!((off.holes, off.max_angle_deg, off.min_return), (false, 90.0, 0.0));
+        assert_eq!(off.color_noise, SensorConfig::default().color_noise);
+        let on = parse("walking_xyz?noise=off&blur=20&offset_ms=-12&autoexposure=on&holes=on").unwrap().sensor;
+        assert!((on.exposure_s - 0.02).abs() < 1e-12 && (on.depth_offset_s + 0.012).abs() < 1e-12);
+        assert!(on.auto_exposure > 0.0 && on.holes && on.min_return > 0.0);
+        assert!(message("walking_xyz?offset_ms=5000").contains("between -1 and 1 s"));
     }
 
     #[test]

@@ -71,7 +71,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
     let mut progress = Progress::new(terminal, "rendering", world.len());
     let mut injector = FaultInjector::new(args.faults.clone(), world.timestamp_ns(0));
     let mut boxes = BoxList { classes: CLASS_NAMES.map(str::to_owned).to_vec(), frames: Vec::new() };
-    let mut number = 0;
+    let (mut number, mut offset_ns) = (0, 0);
     let batch = BATCH_PER_THREAD * rayon::current_num_threads();
     for start in (0..world.len()).step_by(batch) {
         let end = (start + batch).min(world.len());
@@ -79,6 +79,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
         shots.par_iter().try_for_each(|shot| writer.write_mask(shot.frame.timestamp_ns, &shot.instances))?;
         for shot in shots {
             boxes.frames.push(frame_boxes(&shot));
+            offset_ns = shot.depth_timestamp_ns - shot.frame.timestamp_ns;
             injector.push(shot.frame);
         }
         if end == world.len() {
@@ -88,7 +89,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
         deliveries.par_iter().enumerate().try_for_each(|(k, d)| writer.write_images(number + k, &d.frame))?;
         for delivery in &deliveries {
             let stamp = delivery.has_stamp.then_some(delivery.frame.timestamp_ns);
-            writer.list(number, ListedStamps { color_ns: stamp, depth_ns: stamp });
+            writer.list(number, ListedStamps { color_ns: stamp, depth_ns: stamp.map(|ns| ns + offset_ns) });
             number += 1;
         }
         progress.at(end, String::new);
