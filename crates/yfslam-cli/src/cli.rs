@@ -2,7 +2,7 @@
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 
-use crate::command::{completions, config, demo, eval, info, run};
+use crate::command::{completions, config, demo, eval, info, run, synth};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -36,6 +36,7 @@ pub enum Command {
     Run(run::RunArgs),
     Eval(eval::EvalArgs),
     Demo(demo::DemoArgs),
+    Synth(synth::SynthArgs),
     Info(info::InfoArgs),
     Config(config::ConfigArgs),
     Completions(completions::CompletionsArgs),

@@ -49,25 +49,30 @@ impl Progress {
 
     /// Tells of one more frame.
     pub fn frame(&mut self, frames: &FrameTally, state: TrackingState) {
+        let state = match state {
+            TrackingState::NotInitialized => "starting",
+            TrackingState::Tracking => "tracking",
+            TrackingState::Lost => "lost",
+        };
+        self.at(frames.total(), || format!("{state}  {:5.1} % tracked", frames.tracked_percent()));
+    }
+
+    /// Tells that `now` frames are done, and what about them.
+    pub fn at(&mut self, now: usize, about: impl Fn() -> String) {
         let (since, done) = self.rate_since;
         if since.elapsed() >= RATE_OVER {
-            self.fps = Some((frames.total() - done) as f64 / since.elapsed().as_secs_f64());
-            self.rate_since = (Instant::now(), frames.total());
+            self.fps = Some((now - done) as f64 / since.elapsed().as_secs_f64());
+            self.rate_since = (Instant::now(), now);
         }
         let message = || {
-            let state = match state {
-                TrackingState::NotInitialized => "starting",
-                TrackingState::Tracking => "tracking",
-                TrackingState::Lost => "lost",
-            };
             let fps = self.fps.map_or("    -".to_owned(), |fps| format!("{fps:5.1}"));
-            format!("{fps} fps  {state}  {:5.1} % tracked", frames.tracked_percent())
+            format!("{fps} fps  {}", about())
         };
         if let Some(bar) = &self.bar {
-            bar.set_position(frames.total() as u64);
+            bar.set_position(now as u64);
             bar.set_message(message());
         } else if self.lines && self.last_line.elapsed() >= LINE_EVERY {
-            let line = format!("{}: {}/{} frames  {}", self.label, frames.total(), self.total, message());
+            let line = format!("{}: {now}/{} frames  {}", self.label, self.total, message());
             self.last_line = Instant::now();
             // Nobody is left to tell if standard error is closed.
             let _ = writeln!(std::io::stderr().lock(), "{line}");

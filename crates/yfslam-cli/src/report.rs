@@ -3,6 +3,7 @@
 use serde::Serialize;
 use yfslam::{Camera, Config};
 use yfslam_eval::Evaluation;
+use yfslam_io::Fault;
 use yfslam_io::sequence::AssociationReport;
 
 use crate::detector::ModelIdentity;
@@ -16,6 +17,7 @@ pub struct Run<'a> {
     pub sequence: &'a str,
     pub source: &'a Source,
     pub boxes: BoxSource<'a>,
+    pub faults: &'a [Fault],
     pub outcome: &'a Outcome,
     pub truth: Option<&'a Truth>,
     pub evaluation: Option<&'a Evaluation>,
@@ -32,6 +34,8 @@ pub struct Report<'a> {
     pub camera: &'a Camera,
     /// Where the boxes of movable objects come from.
     pub boxes: BoxSource<'a>,
+    /// Faults put into the frames on purpose.
+    pub faults: Vec<String>,
     pub frames: &'a FrameTally,
     /// What was left out when colour and depth images were paired.
     pub association: Option<Association>,
@@ -58,6 +62,8 @@ pub enum BoxSource<'a> {
     None,
     /// The synthetic world knows them.
     Renderer,
+    /// The `boxes.json` of the folder.
+    Folder,
     /// A network.
     Detector(&'a ModelIdentity),
 }
@@ -78,18 +84,20 @@ pub struct Association {
     pub depth_unmatched: usize,
     pub duplicate_stamps_skipped: usize,
     pub backward_stamps_skipped: usize,
+    pub unstamped_skipped: usize,
 }
 
 impl<'a> Report<'a> {
     /// The report of one run.
     pub fn new(run: &Run<'a>) -> Self {
-        let Run { sequence, source, boxes, outcome, truth, evaluation, config } = *run;
+        let Run { sequence, source, boxes, faults, outcome, truth, evaluation, config } = *run;
         Self {
             yfslam: env!("CARGO_PKG_VERSION"),
             sequence,
             camera_origin: &source.camera.origin,
             camera: &source.camera.camera,
             boxes,
+            faults: faults.iter().map(ToString::to_string).collect(),
             frames: &outcome.frames,
             association: source.association.as_ref().map(Association::from),
             dynamic: &outcome.dynamic,
@@ -115,6 +123,7 @@ impl From<&AssociationReport> for Association {
             depth_unmatched: report.depth_unmatched,
             duplicate_stamps_skipped: report.duplicates_skipped,
             backward_stamps_skipped: report.backward_skipped,
+            unstamped_skipped: report.unstamped_skipped,
         }
     }
 }

@@ -3,6 +3,7 @@
 //! ```text
 //! folder ──Sequence──► entries ──FrameStream──► RgbdFrame, or a FrameError for a frame that cannot be used
 //! preset, settings file or TOML ──load_camera──► Camera
+//! frames ──FaultInjector──► frames as a faulty camera sends them ──RecordingWriter──► folder, with its BoxList
 //! trajectory file ◄──► TrajectoryFile        points, pictures, text ──write_atomically──► files
 //! ```
 //!
@@ -28,10 +29,12 @@
 //! ```
 
 mod ascending;
+pub mod boxes;
 pub mod camera;
 pub mod decode;
 pub mod depth;
 pub mod error;
+pub mod faults;
 pub mod sequence;
 pub mod stream;
 mod text;
@@ -39,10 +42,12 @@ pub mod time;
 pub mod trajectory;
 pub mod write;
 
+pub use boxes::BoxList;
 pub use camera::{CameraSource, detect_camera, load_camera};
 pub use depth::{DepthStatistics, check_recording};
 pub use error::{Error, Result};
+pub use faults::{Delivery, Fault, FaultInjector, FaultKind};
 pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};
 pub use trajectory::{StampedPose, TrajectoryFile, write_trajectory};
-pub use write::write_atomically;
+pub use write::{RecordingWriter, write_atomically};

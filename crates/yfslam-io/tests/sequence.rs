@@ -124,7 +124,7 @@ fn empty_malformed_unsorted_and_binary_lists_are_refused() {
     };
     assert!(refusal_of(b"# nothing\n").contains("rgb.txt: lists no image"));
     assert!(refusal_of(b"100.0 rgb/0.png\n100.1\n").contains("rgb.txt:2"));
-    assert!(refusal_of(b"nan rgb/0.png\n").contains("stamp 'nan'"));
+    assert!(refusal_of(b"nan rgb/0.png\n").contains("lists no image that has a time stamp"));
     assert!(refusal_of(b"5 a\n4 a\n3 a\n2 a\n").contains("3 of its 4 stamps run backward; sort"));
     assert!(refusal_of(b"\xff\xfe1\x00").contains("not UTF-8"));
     fs::write(folder.path().join("associations.txt"), "\n").unwrap();

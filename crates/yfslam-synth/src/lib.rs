@@ -31,6 +31,7 @@ mod rng;
 mod scene;
 mod sensor;
 mod spec;
+mod suite;
 mod surfaces;
 mod texture;
 mod tour;
@@ -39,5 +40,6 @@ mod world;
 pub use config::{
     Activity, CameraMotion, LightConfig, MAX_PEOPLE, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera,
 };
-pub use spec::{is_spec, names, parse};
+pub use spec::{is_spec, parse, parse_with_camera, split};
+pub use suite::{NamedWorld, SUITE, names};
 pub use world::{CLASS_NAMES, SynthFrame, World};

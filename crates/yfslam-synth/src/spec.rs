@@ -2,7 +2,10 @@
 //!
 //! In: the text. Out: a [`WorldConfig`], or an error that lists what would be right.
 
-use crate::config::{Activity, CameraMotion, SceneKind, SensorConfig, WorldConfig, WorldError};
+use yfslam::Camera;
+
+use crate::config::{Activity, CameraMotion, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera};
+use crate::suite::{DEFAULT_NAME, find, names};
 
 /// Keys of a spec and what they set.
 const KEYS: &[(&str, &str)] = &[
@@ -17,7 +20,11 @@ const KEYS: &[(&str, &str)] = &[
     ("height", "px"),
     ("fps", "frames per second"),
     ("shake", "hand shake, 1 is natural"),
-    ("noise", "on or off"),
+    ("noise", "on or off: off is the perfect sensor, without any of the effects below"),
+    ("blur", "ms for which the shutter is open; 0 is off"),
+    ("autoexposure", "on or off"),
+    ("offset_ms", "ms from the colour image to its depth image, such as 12; 0 is off"),
+    ("holes", "on or off: places without depth at edges, on grazing and on dark surfaces"),
     ("boxes", "on or off: exact person boxes as detections"),
     ("shadows", "on or off"),
     ("exposure", "brightness of the picture, 1 is normal"),
@@ -29,10 +36,11 @@ pub fn is_spec(text: &str) -> bool {
     text.starts_with("synth:")
 }
 
-/// Names of all worlds: `sitting` or `walking`, then the camera's motion.
-pub fn names() -> Vec<String> {
-    let pairs = Activity::ALL.iter().flat_map(|(a, _)| CameraMotion::ALL.iter().map(move |(m, _)| format!("{a}_{m}")));
-    pairs.collect()
+/// The name in a spec, and what follows its question mark.
+pub fn split(spec: &str) -> (&str, &str) {
+    let text = spec.strip_prefix("synth:").unwrap_or(spec);
+    let (name, query) = text.split_once('?').unwrap_or((text, ""));
+    (if name.is_empty() { DEFAULT_NAME } else { name }, query)
 }
 
 /// Reads a spec; the prefix `synth:` may be left out, an empty name means `walking_xyz`.
@@ -40,13 +48,20 @@ pub fn names() -> Vec<String> {
 /// # Errors
 /// If the name or a key is unknown, or a value cannot be read or is out of range. The message lists the valid names.
 pub fn parse(spec: &str) -> Result<WorldConfig, WorldError> {
+    parse_with_camera(spec, default_camera())
+}
+
+/// Reads a spec for another camera than the default; `width`, `height` and `fps` in the spec change that camera.
+///
+/// # Errors
+/// As for [`parse`], also if `camera` is none that can be rendered.
+pub fn parse_with_camera(spec: &str, camera: Camera) -> Result<WorldConfig, WorldError> {
     let fail = |reason: String| WorldError::Spec { spec: spec.to_owned(), reason };
-    let text = spec.strip_prefix("synth:").unwrap_or(spec);
-    let (name, query) = text.split_once('?').unwrap_or((text, ""));
-    let name = if name.is_empty() { "walking_xyz" } else { name };
-    let mut config = WorldConfig::default();
-    (config.activity, config.motion) =
+    let (name, query) = split(spec);
+    let mut config = WorldConfig { camera, ..WorldConfig::default() };
+    let world =
         find(name).ok_or_else(|| fail(format!("unknown world `{name}`; the worlds are {}", names().join(", "))))?;
+    world.apply(&mut config);
     for pair in query.split('&').filter(|pair| !pair.is_empty()) {
         let (key, value) =
             pair.split_once('=').ok_or_else(|| fail(format!("`{pair}` is not of the form key=value")))?;
@@ -54,13 +69,6 @@ pub fn parse(spec: &str) -> Result<WorldConfig, WorldError> {
     }
     config.validate().map_err(|error| fail(error.to_string()))?;
     Ok(config)
-}
-
-fn find(name: &str) -> Option<(Activity, CameraMotion)> {
-    let (activity, motion) = name.split_once('_')?;
-    let (_, activity) = *Activity::ALL.iter().find(|(n, _)| *n == activity)?;
-    let (_, motion) = *CameraMotion::ALL.iter().find(|(n, _)| *n == motion)?;
-    Some((activity, motion))
 }
 
 fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
@@ -93,6 +101,17 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
             if !switch(key, value)? {
                 config.sensor = SensorConfig::perfect();
             }
+        }
+        "blur" => config.sensor.exposure_s = 1e-3 * number::<f64>(key, value)?,
+        "offset_ms" => config.sensor.depth_offset_s = 1e-3 * number::<f64>(key, value)?,
+        "autoexposure" => {
+            let adapts = switch(key, value)?;
+            config.sensor.auto_exposure = if adapts { SensorConfig::default().auto_exposure } else { 0.0 };
+        }
+        "holes" => {
+            let from = if switch(key, value)? { SensorConfig::default() } else { SensorConfig::perfect() };
+            let sensor = &mut config.sensor;
+            (sensor.holes, sensor.max_angle_deg, sensor.min_return) = (from.holes, from.max_angle_deg, from.min_return);
         }
         "boxes" => config.detections = switch(key, value)?,
         "shadows" => config.light.moving_shadows = switch(key, value)?,
@@ -129,6 +148,7 @@ fn switch(key: &str, value: &str) -> Result<bool, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::{Activity, CameraMotion};
 
     fn message(spec: &str) -> String {
         parse(spec).unwrap_err().to_string()
@@ -160,8 +180,19 @@ mod tests {
     }
 
     #[test]
+    fn each_effect_of_the_sensor_has_its_switch() {
+        let off = parse("walking_xyz?blur=0&autoexposure=off&holes=off").unwrap().sensor;
+        assert_eq!((off.exposure_s, off.auto_exposure), (0.0, 0.0));
+        assert_eq!((off.holes, off.max_angle_deg, off.min_return), (false, 90.0, 0.0));
+        assert_eq!(off.color_noise, SensorConfig::default().color_noise);
+        let on = parse("walking_xyz?noise=off&blur=20&offset_ms=-12&autoexposure=on&holes=on").unwrap().sensor;
+        assert!((on.exposure_s - 0.02).abs() < 1e-12 && (on.depth_offset_s + 0.012).abs() < 1e-12);
+        assert!(on.auto_exposure > 0.0 && on.holes && on.min_return > 0.0);
+        assert!(message("walking_xyz?offset_ms=5000").contains("between -1 and 1 s"));
+    }
+
+    #[test]
     fn every_listed_name_parses() {
-        assert_eq!(names().len(), 12);
         for name in names() {
             parse(&format!("synth:{name}")).unwrap();
         }

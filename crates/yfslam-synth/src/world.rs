@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 use rayon::prelude::*;
-use yfslam::image::Image;
+use yfslam::image::{DepthImage, Image, RgbImage};
 use yfslam::{BoundingBox, Camera, Detection, RgbdFrame};
 
 use crate::bake::Baker;
@@ -22,10 +22,15 @@ use crate::render::{self, Backdrop, Picture};
 use crate::rng::hash;
 use crate::scene::Scene;
 use crate::sensor;
+use crate::sensor::blur::CameraMove;
+use crate::sensor::exposure::Meter;
 use crate::surfaces::Surfaces;
 
 /// Names of the classes of [`SynthFrame`]'s detections, by [`Detection::class`].
 pub const CLASS_NAMES: [&str; 1] = ["person"];
+
+/// Width of the small pictures that estimates are made on, px.
+const SMALL_WIDTH: usize = 48;
 
 /// A synthetic sequence, ready to render.
 #[derive(Debug)]
@@ -36,6 +41,9 @@ pub struct World {
     path: CameraPath,
     surfaces: Surfaces,
     rays: RayTable,
+    /// Rays of a small picture, for estimates over the whole view.
+    small_rays: RayTable,
+    meter: Meter,
     person_share: f64,
 }
 
@@ -44,7 +52,9 @@ pub struct World {
 pub struct SynthFrame {
     /// What a SLAM system sees. Detections are there if [`WorldConfig::detections`] asks for them.
     pub frame: RgbdFrame,
-    /// Exact pose: world from camera.
+    /// Time of the depth image, ns; that of the colour image plus [`SensorConfig::depth_offset_s`](crate::SensorConfig).
+    pub depth_timestamp_ns: i64,
+    /// Exact pose at the time of the colour image: world from camera.
     pub t_world_cam: Isometry3<f64>,
     /// 0 where the world stands still, k where person k (from 1) is seen.
     pub instances: Image<u8>,
@@ -70,8 +80,11 @@ impl World {
         let surfaces = Surfaces::new(palette, sharpness.clamp(0.05, 3.0) as f32, &scene.mesh, baker);
         let path = CameraPath::new(config, &scene);
         let rays = RayTable::new(&config.camera);
+        let small_rays = RayTable::new(&shrink(&config.camera, SMALL_WIDTH));
+        let seconds = config.frames as f64 / config.camera.fps;
+        let meter = Meter::new(seconds, config.sensor.auto_exposure, hash(config.seed, 0xae));
         let config = config.clone();
-        let mut world = Self { config, scene, people, path, surfaces, rays, person_share: 0.0 };
+        let mut world = Self { config, scene, people, path, surfaces, rays, small_rays, meter, person_share: 0.0 };
         world.choose_distance();
         Ok(world)
     }
@@ -98,7 +111,7 @@ impl World {
 
     /// Time of frame `index`, ns.
     pub fn timestamp_ns(&self, index: usize) -> i64 {
-        (self.seconds(index) * 1e9).round() as i64
+        to_ns(self.seconds(index))
     }
 
     /// Exact pose (world from camera) of frame `index`.
@@ -108,26 +121,19 @@ impl World {
 
     /// Renders frame `index`; numbers past the end go on with the same motion.
     pub fn frame(&self, index: usize) -> SynthFrame {
-        let t_world_cam = self.pose(index);
-        let picture = self.render(&self.rays, self.seconds(index), &t_world_cam);
-        let (width, height) = (self.rays.width, self.rays.height);
+        let (time, t_world_cam) = (self.seconds(index), self.pose(index));
+        let picture = self.render(&self.rays, time, &t_world_cam);
         let noise = hash(self.config.seed, 0x4015_e000 + index as u64);
-        let light = &self.config.light;
-        let sensor = &self.config.sensor;
-        let color =
-            sensor::color::develop(&picture.color, width, height, light.exposure, sensor.color_noise, hash(noise, 0));
-        let depth = sensor::depth::measure(&picture.depth, &self.config.camera, sensor, hash(noise, 1));
+        let color = self.expose(&picture, time, hash(noise, 0));
+        let depth = self.measure(&picture, time, hash(noise, 1));
+        let (width, height) = (self.rays.width, self.rays.height);
         let boxes = self.boxes(&picture.instance);
         let detections = self.config.detections.then(|| {
             boxes.iter().map(|&(_, bbox)| Detection { class: 0, score: 1.0, bbox }).collect::<Vec<Detection>>()
         });
         SynthFrame {
-            frame: RgbdFrame {
-                timestamp_ns: self.timestamp_ns(index),
-                color: Arc::new(color),
-                depth: Arc::new(depth),
-                detections,
-            },
+            depth_timestamp_ns: to_ns(time + self.config.sensor.depth_offset_s),
+            frame: RgbdFrame { timestamp_ns: to_ns(time), color: Arc::new(color), depth: Arc::new(depth), detections },
             t_world_cam,
             instances: image(width, height, picture.instance),
             exact_depth: image(width, height, picture.depth),
@@ -154,6 +160,36 @@ impl World {
             pitch: rays.pitch,
         };
         render::render(rays, &t_cam_world, &view, self.config.antialias)
+    }
+
+    /// The colour image: blur, gain, development.
+    fn expose(&self, picture: &Picture, time: f64, seed: u64) -> RgbImage {
+        let (sensor, (width, height)) = (&self.config.sensor, (self.rays.width, self.rays.height));
+        let gain = self.config.light.exposure * self.meter.gain(time, |at| self.brightness(at));
+        let smeared = (sensor.exposure_s > 0.0).then(|| {
+            let [open, close] = [-0.5, 0.5].map(|part| self.path.pose(time + part * sensor.exposure_s));
+            sensor::blur::smear(&picture.color, &picture.depth, &self.rays, &CameraMove::between(&open, &close))
+        });
+        let linear = smeared.as_ref().unwrap_or(&picture.color);
+        sensor::color::develop(linear, width, height, gain, sensor.color_noise, seed)
+    }
+
+    /// The depth image, which may show the world a little later than the colour image.
+    fn measure(&self, picture: &Picture, time: f64, seed: u64) -> DepthImage {
+        let (camera, sensor) = (&self.config.camera, &self.config.sensor);
+        let later = (sensor.depth_offset_s != 0.0).then(|| {
+            let time = time + sensor.depth_offset_s;
+            self.render(&self.rays, time, &self.path.pose(time))
+        });
+        sensor::depth::measure(later.as_ref().unwrap_or(picture), &self.rays, camera, sensor, seed)
+    }
+
+    /// Mean brightness of the picture, as automatic exposure meters it.
+    fn brightness(&self, time: f64) -> f32 {
+        let picture = self.render(&self.small_rays, time, &self.path.pose(time));
+        // White clips: a lamp in the picture does not count for more.
+        let sum: f32 = picture.color.iter().map(|rgb| rgb.iter().map(|v| v.min(1.0)).sum::<f32>() / 3.0).sum();
+        sum / picture.color.len().max(1) as f32
     }
 
     fn in_camera(&self, occluders: &[Occluder], t_cam_world: &Isometry3<f64>) -> Vec<Occluder> {
@@ -186,8 +222,7 @@ impl World {
     /// Searches how near people walk, so that they cover the wanted share of the picture.
     fn choose_distance(&mut self) {
         const FRAMES: usize = 24;
-        const WIDTH: usize = 48;
-        let rays = RayTable::new(&shrink(&self.config.camera, WIDTH));
+        let rays = self.small_rays.clone();
         let count = FRAMES.min(self.len());
         let times: Vec<f64> = (0..count).map(|k| self.seconds(k * self.len() / count)).collect();
         let backdrops: Vec<Backdrop> =
@@ -237,6 +272,10 @@ fn shrink(camera: &Camera, width: usize) -> Camera {
         cy: (camera.cy + 0.5) / scale - 0.5,
         ..camera.clone()
     }
+}
+
+fn to_ns(seconds: f64) -> i64 {
+    (seconds * 1e9).round() as i64
 }
 
 fn image<T: Copy + Default>(width: usize, height: usize, data: Vec<T>) -> Image<T> {

@@ -292,3 +292,19 @@ fn corners_abound_all_over_the_picture_at_several_scales() {
         assert!(filled >= 38, "at 1/{shrink} of the size only {filled} of 48 cells have a corner");
     }
 }
+
+#[test]
+fn depth_that_lags_a_frame_behind_is_the_depth_of_the_next_frame_and_says_so() {
+    let now = config("walking_xyz?seed=17&people=2&share=0.2");
+    let mut lagging = now.clone();
+    lagging.sensor.depth_offset_s = 1.0 / 30.0;
+    let (now, lagging) = (World::new(&now).unwrap(), World::new(&lagging).unwrap());
+    let (first, second, lagged) = (now.frame(40), now.frame(41), lagging.frame(40));
+    assert!((lagged.depth_timestamp_ns - second.frame.timestamp_ns).abs() <= 1);
+    assert_eq!(lagged.frame.color, first.frame.color);
+    assert_eq!(lagged.exact_depth, first.exact_depth);
+    let depths = lagged.frame.depth.raw.data().iter().zip(second.frame.depth.raw.data());
+    // A pose that differs in the last digit may move a pixel over an edge.
+    let differ = depths.filter(|(a, b)| a.abs_diff(**b) > 1).count();
+    assert!(differ < 20, "{differ} pixels differ");
+}

@@ -85,6 +85,7 @@ pub fn run(args: &DemoArgs, terminal: Terminal) -> Result<()> {
             sequence: &spec,
             source: &source,
             boxes: if method == Method::None { BoxSource::None } else { BoxSource::Renderer },
+            faults: &[],
             outcome: &outcome,
             truth: truth.as_ref(),
             evaluation: Some(&evaluation),

@@ -67,6 +67,7 @@ fn lists(text: &mut String, report: &AssociationReport) -> Result<()> {
         (report.depth_unmatched, "depth images without colour in time"),
         (report.duplicates_skipped, "entries skipped: duplicate stamp"),
         (report.backward_skipped, "entries skipped: stamp runs backward"),
+        (report.unstamped_skipped, "entries skipped: no time stamp (nan)"),
         (report.missing_files, "pairs of which a file is missing"),
     ] {
         if count > 0 {
@@ -188,7 +189,7 @@ fn truth(text: &mut String, path: &Path, sequence: &Sequence) -> Result<()> {
 }
 
 fn synthetic(args: &SourceArgs) -> Result<String> {
-    let config = yfslam_synth::parse(&args.sequence)?;
+    let config = args.world()?;
     let (frames, hz) = (config.frames, config.camera.fps);
     let share_percent = 100.0 * config.person_share;
     let mut text = format!("{}\n", args.sequence);

@@ -6,6 +6,7 @@ pub mod demo;
 pub mod eval;
 pub mod info;
 pub mod run;
+pub mod synth;
 
 use anyhow::Result;
 
@@ -22,6 +23,7 @@ pub fn run(cli: &Cli) -> Result<()> {
         Command::Run(args) => run::run(args, terminal),
         Command::Eval(args) => eval::run(args, terminal),
         Command::Demo(args) => demo::run(args, terminal),
+        Command::Synth(args) => synth::run(args, terminal),
         Command::Info(args) => info::run(args),
         Command::Config(args) => config::run(args),
         Command::Completions(args) => completions::run(args),

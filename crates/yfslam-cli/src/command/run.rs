@@ -26,6 +26,7 @@ Examples:
   yfslam run rgbd_dataset_freiburg1_xyz --camera tum1 --method none
   yfslam run 'synth:walking_xyz?seed=7&frames=300' --out walk      no data needed
   yfslam run DIR --start 100 --end 400 --reverse --overlay
+  yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
 
 In the output folder:
   trajectory.txt  all tracked frames, poses as known at the end, world from camera (TUM format)
@@ -70,13 +71,16 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let boxes = match &identity {
         Some(identity) => BoxSource::Detector(identity),
         None if config.dynamic.method == Method::None => BoxSource::None,
-        None => BoxSource::Renderer,
+        None if args.source.is_synthetic() => {
+            terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
+            BoxSource::Renderer
+        }
+        None => {
+            terminal.note("no --detector: the boxes of people come from the folder's boxes.json");
+            BoxSource::Folder
+        }
     };
-    let own_boxes = matches!(boxes, BoxSource::Renderer);
-    if own_boxes {
-        terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
-    }
-    let mut source = args.source.open(own_boxes)?;
+    let mut source = args.source.open(matches!(boxes, BoxSource::Renderer | BoxSource::Folder))?;
     let truth = find_truth(args, &source, terminal)?;
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
     let pictures = args.overlay.then(|| Overlay::prepare(out.path(), config.dynamic.open_score)).transpose()?;
@@ -94,6 +98,7 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         sequence: &args.source.sequence,
         source: &source,
         boxes,
+        faults: &args.source.faults,
         outcome: &outcome,
         truth: truth.as_ref(),
         evaluation: evaluation.as_ref().and_then(|e| e.as_ref().ok()),
@@ -115,7 +120,7 @@ fn load_detector(args: &RunArgs, config: &Config) -> Result<Option<LoadedDetecto
     };
     match &args.detector.detector {
         Some(file) => Ok(Some(detector::load(&args.detector, file, config)?)),
-        None if args.source.is_synthetic() => Ok(None),
+        None if args.source.knows_boxes() => Ok(None),
         None => bail!(
             "method {method} keeps people out and needs a network that finds them; give --detector FILE.onnx (YOLO-FastestV2 as \
              ONNX with six raw outputs: the official COCO weights or your own training), or --method none to trust every feature"
@@ -178,10 +183,14 @@ fn summary(report: &Report, source: &Source, outcome: &Outcome) -> Result<String
         )?;
     }
     if let Some(a) = &report.association
-        && a.duplicate_stamps_skipped + a.backward_stamps_skipped > 0
+        && a.duplicate_stamps_skipped + a.backward_stamps_skipped + a.unstamped_skipped > 0
     {
-        let (duplicate, backward) = (a.duplicate_stamps_skipped, a.backward_stamps_skipped);
-        writeln!(text, "list entries skipped: {duplicate} × duplicate stamp, {backward} × stamp runs backward")?;
+        let (duplicate, backward, unstamped) =
+            (a.duplicate_stamps_skipped, a.backward_stamps_skipped, a.unstamped_skipped);
+        writeln!(
+            text,
+            "list entries skipped: {duplicate} × duplicate stamp, {backward} × stamp runs backward, {unstamped} × no stamp"
+        )?;
     }
     if frames.detector_failures > 0 {
         writeln!(

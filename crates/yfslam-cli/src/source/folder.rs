@@ -3,35 +3,43 @@
 use std::io::ErrorKind;
 
 use anyhow::{Result, ensure};
-use yfslam::{Camera, RgbdFrame};
+use yfslam::{Camera, Detection, RgbdFrame};
 use yfslam_io::camera::check_camera;
 use yfslam_io::decode::DecodeError;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
 use yfslam_io::{
-    CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, detect_camera,
+    BoxList, CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, detect_camera,
     load_camera,
 };
 
-use super::{Frames, Skip, Source, SourceArgs};
+use super::{FolderBoxes, Frames, Player, Skip, Source, SourceArgs};
 use crate::pipeline::Stages;
 
 /// Frames of the whole sequence that are tried where the first ones are unusable.
 const PROBES: usize = 30;
 
-/// Opens the folder, finds its camera and checks both against the first frames.
-pub fn open(args: &SourceArgs) -> Result<Source> {
+/// Opens the folder, finds its camera and checks both against the first frames; reads its boxes if `own_boxes` asks for them.
+pub fn open(args: &SourceArgs, own_boxes: bool) -> Result<Source> {
     let sequence = open_sequence(args)?;
     let camera = camera(args)?;
     if !camera.unused_keys.is_empty() {
         tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "not used of the camera file");
     }
     check(&sequence, &camera.camera)?;
-    let frames = Frames::Folder(FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?);
+    let boxes = match own_boxes {
+        true => {
+            let detections = BoxList::read(&args.boxes_file())?.detections();
+            Some(FolderBoxes { detections, mirror: sequence.mirror })
+        }
+        false => None,
+    };
+    let stream = FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?;
+    let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();
     Ok(Source {
         name: name(args),
         camera,
-        frames,
-        stamps_ns: sequence.entries.iter().map(|entry| entry.timestamp_ns).collect(),
+        frames: Frames::new(Player::Folder(stream, boxes), args, &stamps_ns),
+        stamps_ns,
         association: Some(sequence.report),
         mirror: sequence.mirror,
     })
@@ -88,14 +96,30 @@ fn name(args: &SourceArgs) -> String {
     folder.file_name().map_or("sequence".into(), |name| name.to_string_lossy().into_owned())
 }
 
-pub fn next(stream: &mut FrameStream, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
+pub fn next(
+    stream: &mut FrameStream,
+    boxes: Option<&FolderBoxes>,
+    stages: &mut Stages,
+) -> Option<Result<RgbdFrame, Skip>> {
     let before = stream.times();
     let frame = stream.next()?;
     let after = stream.times();
     stages.push("decode color", after.color - before.color);
     stages.push("decode depth", after.depth - before.depth);
     stages.push("decode wait", after.waited - before.waited);
+    let frame = frame.map(|frame| match boxes {
+        Some(boxes) => RgbdFrame { detections: Some(boxes.at(frame.timestamp_ns)), ..frame },
+        None => frame,
+    });
     Some(frame.map_err(|error| Skip { reason: reason(&error.fault), message: error.to_string() }))
+}
+
+impl FolderBoxes {
+    /// The boxes of the frame that is played at this time; none if the file does not list it.
+    fn at(&self, played_ns: i64) -> Vec<Detection> {
+        let recorded_ns = self.mirror.map_or(played_ns, |mirror| mirror.apply(played_ns));
+        self.detections.get(&recorded_ns).cloned().unwrap_or_default()
+    }
 }
 
 /// The kind of fault, for counting.

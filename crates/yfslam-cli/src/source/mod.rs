@@ -5,16 +5,18 @@
 mod folder;
 mod synth;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
 use yfslam::RgbdFrame;
 use yfslam_eval::StampedPose;
+use yfslam_io::boxes::{BOXES_FILE, KnownDetections};
 use yfslam_io::sequence::AssociationReport;
-use yfslam_io::time::TimeMirror;
+use yfslam_io::time::{TimeMirror, format_stamp};
 use yfslam_io::trajectory::mirror_trajectory;
-use yfslam_io::{CameraSource, FrameStream};
+use yfslam_io::{CameraSource, Delivery, Fault, FaultInjector, FrameStream, load_camera};
+use yfslam_synth::{WorldConfig, default_camera, parse_with_camera};
 
 use crate::accuracy::{read_poses, to_eval};
 use crate::pipeline::Stages;
@@ -33,7 +35,7 @@ pub struct SourceArgs {
     #[arg(value_name = "SEQUENCE", help_heading = None)]
     pub sequence: String,
     /// The camera: tum1, tum2, tum3, bonn, or a settings file (ORB-SLAM's YAML or our TOML) [default: camera.toml or camera.yaml in
-    /// the folder].
+    /// the folder]. A synthetic world is rendered for it.
     #[arg(long, value_name = "PRESET|FILE")]
     pub camera: Option<String>,
     /// Depth units per metre, instead of the camera's: 5000 for TUM and Bonn, 1000 for millimetres.
@@ -51,6 +53,10 @@ pub struct SourceArgs {
     /// Play backward: frames in reverse order, time stamps mirrored.
     #[arg(long)]
     pub reverse: bool,
+    /// Put a fault into the frames, from START seconds on for SECONDS: dropped, repeated, blank, black, frozen, late, depth-dropout,
+    /// nan-stamp or covered; can be given several times.
+    #[arg(long = "fault", value_name = "KIND@START+SECONDS")]
+    pub faults: Vec<Fault>,
 }
 
 /// A sequence ready to play.
@@ -86,22 +92,66 @@ pub struct Skip {
     pub message: String,
 }
 
-/// Frames, one after another.
-pub enum Frames {
-    /// Decoded from files.
-    Folder(FrameStream),
-    /// Rendered.
+/// Frames, one after another, with the faults that were asked for.
+pub struct Frames {
+    player: Player,
+    faults: FaultInjector,
+}
+
+/// What frames are made of.
+enum Player {
+    /// Files.
+    Folder(FrameStream, Option<FolderBoxes>),
+    /// A world.
     Synth(Renderer),
 }
 
+/// What a folder knows about the boxes in its frames.
+struct FolderBoxes {
+    detections: KnownDetections,
+    mirror: Option<TimeMirror>,
+}
+
 impl Frames {
+    fn new(player: Player, args: &SourceArgs, stamps_ns: &[i64]) -> Self {
+        let first_ns = stamps_ns.first().copied().unwrap_or(0);
+        Self { player, faults: FaultInjector::new(args.faults.clone(), first_ns) }
+    }
+
     /// The next frame, or why it cannot be used; `None` at the end. Notes in `stages` what it took to get it.
     pub fn next(&mut self, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
-        match self {
-            Self::Folder(stream) => folder::next(stream, stages),
-            Self::Synth(renderer) => renderer.next(stages).map(Ok),
+        loop {
+            if let Some(delivery) = self.faults.pop() {
+                return Some(usable(delivery));
+            }
+            let frame = match &mut self.player {
+                Player::Folder(stream, boxes) => folder::next(stream, boxes.as_ref(), stages),
+                Player::Synth(renderer) => renderer.next(stages).map(Ok),
+            };
+            match frame {
+                Some(Ok(frame)) => self.faults.push(frame),
+                Some(Err(skip)) => return Some(Err(skip)),
+                None => {
+                    self.faults.finish();
+                    return self.faults.pop().map(usable);
+                }
+            }
         }
     }
+}
+
+/// Refuses a frame without a time or without any depth.
+fn usable(Delivery { frame, has_stamp }: Delivery) -> Result<RgbdFrame, Skip> {
+    let skip = |reason, problem: &str| {
+        Err(Skip { reason, message: format!("the frame at t = {} {problem}", format_stamp(frame.timestamp_ns)) })
+    };
+    if !has_stamp {
+        return skip("no time stamp", "came with a time stamp that is not a number");
+    }
+    if frame.depth.raw.data().iter().all(|&raw| raw == 0) {
+        return skip("no depth in any pixel", "has no depth in any pixel");
+    }
+    Ok(frame)
 }
 
 impl SourceArgs {
@@ -115,21 +165,40 @@ impl SourceArgs {
             start: 0,
             end: None,
             reverse: false,
+            faults: Vec::new(),
         }
     }
 
-    /// Opens the sequence. A synthetic world brings its own boxes if `own_boxes` asks for them.
+    /// Opens the sequence. Frames bring the boxes that the world or the folder knows if `own_boxes` asks for them.
     ///
     /// # Errors
     /// What cannot be read, with file, value and cure.
     pub fn open(&self, own_boxes: bool) -> Result<Source> {
-        if !self.is_synthetic() {
-            return folder::open(self);
+        if self.is_synthetic() { synth::open(self, own_boxes) } else { folder::open(self, own_boxes) }
+    }
+
+    /// The world that was named, for the camera that was asked for.
+    ///
+    /// # Errors
+    /// The spec or the camera cannot be used.
+    pub fn world(&self) -> Result<WorldConfig> {
+        if self.depth_factor.is_some() {
+            bail!("a synthetic world has the depth factor of its camera; leave out --depth-factor");
         }
-        if self.camera.is_some() || self.depth_factor.is_some() {
-            bail!("a synthetic world brings its own camera; leave out --camera and --depth-factor");
-        }
-        synth::open(self, own_boxes)
+        let camera = match &self.camera {
+            Some(spec) => load_camera(spec, None)?.camera,
+            None => default_camera(),
+        };
+        Ok(parse_with_camera(&self.sequence, camera)?)
+    }
+
+    /// Whether boxes are known without a detector: by a synthetic world, or from a `boxes.json`.
+    pub fn knows_boxes(&self) -> bool {
+        self.is_synthetic() || self.boxes_file().is_file()
+    }
+
+    fn boxes_file(&self) -> PathBuf {
+        self.folder().join(BOXES_FILE)
     }
 
     /// Whether a synthetic world was named.
@@ -145,9 +214,9 @@ impl SourceArgs {
 impl Source {
     /// The exact truth that a synthetic world knows.
     pub fn truth_of_world(&self) -> Option<Truth> {
-        match &self.frames {
-            Frames::Synth(renderer) => Some(renderer.truth()),
-            Frames::Folder(_) => None,
+        match &self.frames.player {
+            Player::Synth(renderer) => Some(renderer.truth()),
+            Player::Folder(..) => None,
         }
     }
 

@@ -13,7 +13,7 @@ use yfslam_io::CameraSource;
 use yfslam_io::time::TimeMirror;
 use yfslam_synth::{World, WorldConfig};
 
-use super::{Frames, Source, SourceArgs, Truth};
+use super::{Frames, Player, Source, SourceArgs, Truth};
 use crate::pipeline::Stages;
 
 /// Frames that wait rendered for the caller.
@@ -37,7 +37,7 @@ struct Part {
 
 /// Builds the world that the spec names and starts to render it.
 pub fn open(args: &SourceArgs, own_boxes: bool) -> Result<Source> {
-    let mut config = yfslam_synth::parse(&args.sequence)?;
+    let mut config = args.world()?;
     config.detections = own_boxes;
     let count = config.frames;
     let range = args.start..args.end.unwrap_or(count).min(count);
@@ -51,14 +51,14 @@ pub fn open(args: &SourceArgs, own_boxes: bool) -> Result<Source> {
     let world = Arc::new(World::new(&config)?);
     let span = TimeMirror { first_ns: world.timestamp_ns(range.start), last_ns: world.timestamp_ns(range.end - 1) };
     let part = Part { range, mirror: args.reverse.then_some(span) };
-    let stamps_ns = part.indices().map(|index| part.stamp_ns(&world, index)).collect();
-    let name = args.sequence.trim_start_matches("synth:");
-    let name = name.split_once('?').map_or(name, |(name, _)| name);
+    let stamps_ns: Vec<i64> = part.indices().map(|index| part.stamp_ns(&world, index)).collect();
+    let (name, _) = yfslam_synth::split(&args.sequence);
+    let renderer = Renderer::start(world, part.clone())?;
     Ok(Source {
-        name: if name.is_empty() { "walking_xyz".into() } else { name.into() },
+        name: name.into(),
         camera: world_camera(&config),
         mirror: part.mirror,
-        frames: Frames::Synth(Renderer::start(world, part)?),
+        frames: Frames::new(Player::Synth(renderer), args, &stamps_ns),
         stamps_ns,
         association: None,
     })

@@ -15,12 +15,15 @@ pub struct ListedFile {
     pub path: PathBuf,
 }
 
+/// Entries of a list, and the number of lines left out because their stamp is `nan`.
+pub type Listed<T> = (Vec<T>, usize);
+
 /// Parses lines `stamp file`; the file name may hold blanks.
 ///
 /// # Errors
 /// A malformed line, named by number and `source`.
-pub fn parse_file_list(text: &str, source: &Path) -> Result<Vec<ListedFile>> {
-    let mut files = Vec::new();
+pub fn parse_file_list(text: &str, source: &Path) -> Result<Listed<ListedFile>> {
+    let (mut files, mut unstamped) = (Vec::new(), 0);
     for (number, line) in content_lines(text) {
         let Some((stamp, name)) = line.split_once(char::is_whitespace) else {
             let problem = format!("'{line}' has one column");
@@ -31,29 +34,39 @@ pub fn parse_file_list(text: &str, source: &Path) -> Result<Vec<ListedFile>> {
                 "write 'stamp file', such as '1305031102.175304 rgb/1.png'",
             ));
         };
-        files.push(listed_file(stamp, name.trim(), source, number)?);
+        match listed_file(stamp, name.trim(), source, number)? {
+            Some(file) => files.push(file),
+            None => unstamped += 1,
+        }
     }
-    Ok(files)
+    Ok((files, unstamped))
 }
 
 /// Parses lines `stamp file stamp file` into pairs in the order of the columns.
 ///
 /// # Errors
 /// A malformed line, named by number and `source`.
-pub fn parse_pair_list(text: &str, source: &Path) -> Result<Vec<[ListedFile; 2]>> {
-    let mut pairs = Vec::new();
+pub fn parse_pair_list(text: &str, source: &Path) -> Result<Listed<[ListedFile; 2]>> {
+    let (mut pairs, mut unstamped) = (Vec::new(), 0);
     for (number, line) in content_lines(text) {
         let columns: Vec<&str> = line.split_whitespace().collect();
         let [stamp_a, name_a, stamp_b, name_b] = columns[..] else {
             let problem = format!("'{line}' has {} columns, not 4", columns.len());
             return Err(Error::line(source, number, problem, "write 'stamp rgb-file stamp depth-file'"));
         };
-        pairs.push([listed_file(stamp_a, name_a, source, number)?, listed_file(stamp_b, name_b, source, number)?]);
+        match (listed_file(stamp_a, name_a, source, number)?, listed_file(stamp_b, name_b, source, number)?) {
+            (Some(a), Some(b)) => pairs.push([a, b]),
+            _ => unstamped += 1,
+        }
     }
-    Ok(pairs)
+    Ok((pairs, unstamped))
 }
 
-fn listed_file(stamp: &str, name: &str, source: &Path, line: usize) -> Result<ListedFile> {
+/// `None` where the recorder knew no time: it wrote `nan`.
+fn listed_file(stamp: &str, name: &str, source: &Path, line: usize) -> Result<Option<ListedFile>> {
+    if stamp.eq_ignore_ascii_case("nan") {
+        return Ok(None);
+    }
     let stamp_ns = parse_stamp_ns(stamp).map_err(|error| {
         Error::line(
             source,
@@ -62,7 +75,7 @@ fn listed_file(stamp: &str, name: &str, source: &Path, line: usize) -> Result<Li
             "write stamps as decimal seconds, such as 1305031102.175304",
         )
     })?;
-    Ok(ListedFile { stamp_ns, path: name.into() })
+    Ok(Some(ListedFile { stamp_ns, path: name.into() }))
 }
 
 /// Whether the second column of files is the colour image, judged by names such as `depth/…` and `rgb/…`; `None` if they don't tell.
@@ -90,11 +103,20 @@ mod tests {
     use proptest::prelude::*;
 
     fn list(text: &str) -> Result<Vec<ListedFile>> {
-        parse_file_list(text, Path::new("rgb.txt"))
+        Ok(parse_file_list(text, Path::new("rgb.txt"))?.0)
     }
 
     fn pairs(text: &str) -> Result<Vec<[ListedFile; 2]>> {
-        parse_pair_list(text, Path::new("associations.txt"))
+        Ok(parse_pair_list(text, Path::new("associations.txt"))?.0)
+    }
+
+    #[test]
+    fn lines_without_a_time_are_left_out_and_counted() {
+        let path = Path::new("a.txt");
+        let (files, unstamped) = parse_file_list("1 a\nnan b\nNaN c\n2 d\n", path).unwrap();
+        assert_eq!((files.len(), unstamped), (2, 2));
+        let (pairs, unstamped) = parse_pair_list("1 a 1 b\nnan c 2 d\n2 e nan f\n", path).unwrap();
+        assert_eq!((pairs.len(), unstamped), (1, 2));
     }
 
     #[test]

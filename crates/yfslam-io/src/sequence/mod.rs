@@ -66,6 +66,8 @@ pub struct AssociationReport {
     pub duplicates_skipped: usize,
     /// Entries skipped because their stamps run backward.
     pub backward_skipped: usize,
+    /// Entries skipped because their stamp is `nan`.
+    pub unstamped_skipped: usize,
     /// Frames of which a file does not exist; they are played as errors.
     pub missing_files: usize,
 }

@@ -13,16 +13,17 @@ use crate::time::format_stamp;
 
 /// Takes the pairs of an `associations.txt`; the paths are still relative to its folder.
 pub fn from_associations(path: &Path) -> Result<(Vec<FrameEntry>, AssociationReport)> {
-    let pairs = parse_pair_list(&read_text(path)?, path)?;
+    let (pairs, unstamped_skipped) = parse_pair_list(&read_text(path)?, path)?;
     // Names decide; where they are silent the customary order holds: colour first.
     let swapped = color_is_second(&pairs).unwrap_or(false);
-    let listed = pairs.len();
+    let listed = pairs.len() + unstamped_skipped;
     let entry = |[a, b]: [ListedFile; 2]| if swapped { frame_entry(b, a) } else { frame_entry(a, b) };
     let all: Vec<FrameEntry> = pairs.into_iter().map(entry).collect();
     let mut report = AssociationReport {
         from_associations_file: true,
         color_listed: listed,
         depth_listed: listed,
+        unstamped_skipped,
         ..Default::default()
     };
     let kept = in_order(all, |e| e.timestamp_ns, path, &mut report)?;
@@ -39,9 +40,14 @@ pub fn from_lists(folder: &Path, tolerance_ns: i64) -> Result<(Vec<FrameEntry>, 
     if !color_path.is_file() || !depth_path.is_file() {
         return Err(no_lists(folder));
     }
-    let color = parse_file_list(&read_text(&color_path)?, &color_path)?;
-    let depth = parse_file_list(&read_text(&depth_path)?, &depth_path)?;
-    let mut report = AssociationReport { color_listed: color.len(), depth_listed: depth.len(), ..Default::default() };
+    let (color, color_unstamped) = parse_file_list(&read_text(&color_path)?, &color_path)?;
+    let (depth, depth_unstamped) = parse_file_list(&read_text(&depth_path)?, &depth_path)?;
+    let mut report = AssociationReport {
+        color_listed: color.len() + color_unstamped,
+        depth_listed: depth.len() + depth_unstamped,
+        unstamped_skipped: color_unstamped + depth_unstamped,
+        ..Default::default()
+    };
     let color = in_order(color, |f| f.stamp_ns, &color_path, &mut report)?;
     let depth = in_order(depth, |f| f.stamp_ns, &depth_path, &mut report)?;
     let stamps = |files: &[ListedFile]| files.iter().map(|f| f.stamp_ns).collect::<Vec<_>>();
@@ -73,7 +79,11 @@ fn in_order<T>(
     report: &mut AssociationReport,
 ) -> Result<Vec<T>> {
     if items.is_empty() {
-        return Err(Error::content(path, "lists no image", "record or unpack the sequence again"));
+        return Err(Error::content(
+            path,
+            "lists no image that has a time stamp",
+            "record or unpack the sequence again",
+        ));
     }
     let kept = keep_ascending(items, stamp, path)?;
     report.duplicates_skipped += kept.duplicates;

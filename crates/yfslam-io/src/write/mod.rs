@@ -2,6 +2,7 @@
 
 mod ply;
 mod png;
+mod recording;
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -11,6 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::error::{Error, Result};
 pub use ply::{PlyPoint, write_ply};
 pub use png::{write_color_png, write_depth_png};
+pub use recording::{ListedStamps, RecordingWriter};
 
 /// Writes `path` by `write`: into a temporary file beside it that takes its place once all of it is on the disk.
 ///
@@ -51,22 +53,44 @@ fn write_through(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()
     if is_regular { file.sync_all() } else { Ok(()) }
 }
 
-/// A temporary file that is removed unless it was renamed, also when its writer panics.
+/// A temporary file or folder that is removed unless it was renamed, also when its writer panics.
+#[derive(Debug)]
 struct Temporary(PathBuf);
 
 impl Temporary {
     fn create(folder: &Path) -> io::Result<(Self, File)> {
+        Self::claim(folder, |path| OpenOptions::new().write(true).create_new(true).open(path))
+    }
+
+    fn create_folder(folder: &Path) -> io::Result<Self> {
+        Ok(Self::claim(folder, |path| fs::create_dir(path))?.0)
+    }
+
+    /// Moves what stands at `path` to a temporary name beside it.
+    fn aside(path: &Path) -> io::Result<Self> {
+        let path = path.canonicalize()?;
+        let aside = Self::create_folder(path.parent().unwrap_or(Path::new(".")))?;
+        fs::rename(&path, &aside.0)?;
+        Ok(aside)
+    }
+
+    /// Takes a name that nobody has.
+    fn claim<T>(folder: &Path, take: impl Fn(&Path) -> io::Result<T>) -> io::Result<(Self, T)> {
         static COUNTER: AtomicU64 = AtomicU64::new(0);
         loop {
             let number = COUNTER.fetch_add(1, Ordering::Relaxed);
             let path = folder.join(format!(".yfslam-{}-{number}.tmp", std::process::id()));
-            match OpenOptions::new().write(true).create_new(true).open(&path) {
-                Ok(file) => return Ok((Self(path), file)),
+            match take(&path) {
+                Ok(taken) => return Ok((Self(path), taken)),
                 // Left behind by a process of the same number that was killed.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
         }
+    }
+
+    fn path(&self) -> &Path {
+        &self.0
     }
 
     fn rename_to(mut self, target: &Path) -> io::Result<()> {
@@ -79,7 +103,8 @@ impl Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if !self.0.as_os_str().is_empty() {
-            let _ = fs::remove_file(&self.0);
+            // One of them it is.
+            let _ = fs::remove_file(&self.0).or_else(|_| fs::remove_dir_all(&self.0));
         }
     }
 }

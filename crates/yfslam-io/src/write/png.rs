@@ -1,6 +1,6 @@
 //! Pictures as PNG: colour for people, 16-bit depth for programs. Compressed fast rather than small.
 
-use std::io;
+use std::io::{self, Write};
 use std::path::Path;
 
 use png::{BitDepth, ColorType, Compression, Encoder};
@@ -14,7 +14,7 @@ use crate::write::write_atomically;
 /// # Errors
 /// The file cannot be written, or the image is empty.
 pub fn write_color_png(path: &Path, image: &RgbImage) -> Result<()> {
-    write_png(path, (image.width(), image.height()), (ColorType::Rgb, BitDepth::Eight), image.data().as_flattened())
+    write_atomically(path, |writer| encode_color(image, writer))
 }
 
 /// Writes depth in sensor units as a 16-bit grey PNG, the form in which TUM and Bonn recordings keep it.
@@ -22,21 +22,38 @@ pub fn write_color_png(path: &Path, image: &RgbImage) -> Result<()> {
 /// # Errors
 /// The file cannot be written, or the image is empty.
 pub fn write_depth_png(path: &Path, depth: &Image<u16>) -> Result<()> {
-    let bytes: Vec<u8> = depth.data().iter().flat_map(|value| value.to_be_bytes()).collect();
-    write_png(path, (depth.width(), depth.height()), (ColorType::Grayscale, BitDepth::Sixteen), &bytes)
+    write_atomically(path, |writer| encode_depth(depth, writer))
 }
 
-fn write_png(path: &Path, size: (usize, usize), (color, depth): (ColorType, BitDepth), bytes: &[u8]) -> Result<()> {
-    write_atomically(path, |writer| {
-        let side = |length: usize| u32::try_from(length).map_err(io::Error::other);
-        let mut encoder = Encoder::new(writer, side(size.0)?, side(size.1)?);
-        encoder.set_color(color);
-        encoder.set_depth(depth);
-        encoder.set_compression(Compression::Fast);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(bytes)?;
-        Ok(writer.finish()?)
-    })
+pub(super) fn encode_color(image: &RgbImage, writer: &mut dyn Write) -> io::Result<()> {
+    let kind = (ColorType::Rgb, BitDepth::Eight);
+    encode((image.width(), image.height()), kind, image.data().as_flattened(), writer)
+}
+
+pub(super) fn encode_depth(depth: &Image<u16>, writer: &mut dyn Write) -> io::Result<()> {
+    let bytes: Vec<u8> = depth.data().iter().flat_map(|value| value.to_be_bytes()).collect();
+    encode((depth.width(), depth.height()), (ColorType::Grayscale, BitDepth::Sixteen), &bytes, writer)
+}
+
+/// A mask: 8-bit grey, the value is the instance.
+pub(super) fn encode_mask(mask: &Image<u8>, writer: &mut dyn Write) -> io::Result<()> {
+    encode((mask.width(), mask.height()), (ColorType::Grayscale, BitDepth::Eight), mask.data(), writer)
+}
+
+fn encode(
+    size: (usize, usize),
+    (color, depth): (ColorType, BitDepth),
+    bytes: &[u8],
+    writer: &mut dyn Write,
+) -> io::Result<()> {
+    let side = |length: usize| u32::try_from(length).map_err(io::Error::other);
+    let mut encoder = Encoder::new(writer, side(size.0)?, side(size.1)?);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_compression(Compression::Fast);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(bytes)?;
+    Ok(writer.finish()?)
 }
 
 #[cfg(test)]

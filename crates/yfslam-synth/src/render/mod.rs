@@ -21,7 +21,7 @@ use shade::View;
 use crate::mesh::Mesh;
 
 /// What the renderer makes of one view; row-major, `width * height` pixels.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Picture {
     /// Linear RGB, 1 is white.
     pub color: Vec<[f32; 3]>,
@@ -29,11 +29,18 @@ pub struct Picture {
     pub depth: Vec<f32>,
     /// 0 static, k actor.
     pub instance: Vec<u8>,
+    /// Share of the projector's infrared light that the surface reflects.
+    pub reflectance: Vec<f32>,
 }
 
 impl Picture {
     fn new(pixels: usize) -> Self {
-        Self { color: vec![[0.0; 3]; pixels], depth: vec![0.0; pixels], instance: vec![0; pixels] }
+        Self {
+            color: vec![[0.0; 3]; pixels],
+            depth: vec![0.0; pixels],
+            instance: vec![0; pixels],
+            reflectance: vec![0.0; pixels],
+        }
     }
 }
 
@@ -53,11 +60,12 @@ pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antial
             out
         })
         .collect();
-    let mut picture = Picture { color: Vec::new(), depth: Vec::new(), instance: Vec::new() };
+    let mut picture = Picture::new(0);
     for band in bands {
         picture.color.extend(band.color);
         picture.depth.extend(band.depth);
         picture.instance.extend(band.instance);
+        picture.reflectance.extend(band.reflectance);
     }
     picture
 }

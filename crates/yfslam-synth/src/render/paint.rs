@@ -6,7 +6,7 @@ use super::Picture;
 use super::project::Projected;
 use super::raster::{NOTHING, Visibility};
 use super::rays::{RayTable, TILE};
-use super::shade::{Surface, View};
+use super::shade::{Shaded, Surface, View};
 use crate::light::Occluder;
 
 /// Four samples in a rotated grid, in pixels from the centre.
@@ -55,10 +55,11 @@ impl Painter<'_> {
                     let pixel = row * width + x;
                     out.depth[pixel] = 1.0 / self.seen.inverse_depth[index];
                     out.instance[pixel] = self.view.instance(t);
-                    out.color[pixel] = match self.edge_candidates(band * TILE + row, x) {
+                    let shaded = match self.edge_candidates(band * TILE + row, x) {
                         Some(candidates) => self.supersample(index, &near, &candidates),
                         None => self.view.shade(surface, &near, self.rays.x[index], self.rays.y[index]),
                     };
+                    (out.color[pixel], out.reflectance[pixel]) = (shaded.color, shaded.reflectance);
                 }
             }
         }
@@ -127,7 +128,7 @@ impl Painter<'_> {
     /// Colour of an edge pixel: four places decide how much of the pixel each triangle covers, and each triangle is
     /// shaded once, in the middle of its places (as multisampling hardware does). Places that hit none of the candidates
     /// count for the triangle at the centre.
-    fn supersample(&self, index: usize, near: &[Occluder], candidates: &Candidates) -> [f32; 3] {
+    fn supersample(&self, index: usize, near: &[Occluder], candidates: &Candidates) -> Shaded {
         let (list, count) = candidates;
         // Per candidate: number of places and their sum, in normalised coordinates.
         let mut shares = [(0.0f32, 0.0f32, 0.0f32); 9];
@@ -147,11 +148,13 @@ impl Painter<'_> {
             let (px, py) = if nearest > 0.0 { (x, y) } else { (self.rays.x[index], self.rays.y[index]) };
             (*n, *sx, *sy) = (*n + 1.0, *sx + px, *sy + py);
         }
-        let mut sum = [0.0; 3];
+        let mut sum = Shaded::default();
         for (&id, (n, sx, sy)) in list.iter().zip(shares).filter(|(_, (n, ..))| *n > 0.0) {
             let surface = self.view.surface(&self.triangles[id as usize]);
-            let color = self.view.shade(&surface, near, sx / n, sy / n);
-            (0..3).for_each(|k| sum[k] += color[k] * n / SUBSAMPLES.len() as f32);
+            let shaded = self.view.shade(&surface, near, sx / n, sy / n);
+            let share = n / SUBSAMPLES.len() as f32;
+            (0..3).for_each(|k| sum.color[k] += shaded.color[k] * share);
+            sum.reflectance += shaded.reflectance * share;
         }
         sum
     }

@@ -30,6 +30,19 @@ pub struct View<'a> {
 
 type Plane = [f32; 3];
 
+/// Reflectance of a screen's glass, whatever it shows.
+const GLASS: f32 = 0.04;
+
+/// What a ray meets.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shaded {
+    /// Linear RGB.
+    pub color: [f32; 3],
+    /// Share of the projector's infrared light that the surface reflects: that of its material as a whole, since most inks and dyes let
+    /// infrared pass.
+    pub reflectance: f32,
+}
+
 /// A triangle ready to be shaded: its attributes as planes over the image.
 #[derive(Clone, Copy)]
 pub struct Surface<'a> {
@@ -39,6 +52,7 @@ pub struct Surface<'a> {
     u: Plane,
     v: Plane,
     light: [Plane; 3],
+    reflectance: f32,
     normal: Vec3,
 }
 
@@ -97,12 +111,16 @@ impl<'a> View<'a> {
             u: plane(v.map(|v| v.uv[0])),
             v: plane(v.map(|v| v.uv[1])),
             light,
+            reflectance: match patch.lighting {
+                Lighting::Emissive(_) => GLASS,
+                _ => self.surfaces.texture(patch.texture).mean(),
+            },
             normal: self.r_cam_world * (v[0].normal + v[1].normal + v[2].normal).normalize(),
         }
     }
 
-    /// Linear RGB where the ray (x, y, 1) meets the surface, shaded by those of the occluders that are `near`.
-    pub fn shade(&self, surface: &Surface, near: &[Occluder], x: f32, y: f32) -> [f32; 3] {
+    /// What is seen where the ray (x, y, 1) meets the surface, shaded by those of the occluders that are `near`.
+    pub fn shade(&self, surface: &Surface, near: &[Occluder], x: f32, y: f32) -> Shaded {
         let z = 1.0 / at(&surface.inverse_depth, x, y);
         let (u, v) = (at(&surface.u, x, y) * z, at(&surface.v, x, y) * z);
         let [w, h] = surface.texture.size();
@@ -143,7 +161,8 @@ impl<'a> View<'a> {
         } else {
             1.0
         };
-        std::array::from_fn(|k| color[k] * color[k] * light[k] * shadow)
+        let albedo: [f32; 3] = std::array::from_fn(|k| color[k] * color[k]);
+        Shaded { color: std::array::from_fn(|k| albedo[k] * light[k] * shadow), reflectance: surface.reflectance }
     }
 }
 

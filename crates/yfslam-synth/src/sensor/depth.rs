@@ -1,6 +1,7 @@
-//! Depth as a structured-light sensor measures it: noise, disparity steps, shadow of the projector, range.
+//! Depth as a structured-light sensor measures it: noise, disparity steps, range; holes in the shadow of the projector, at edges, on
+//! grazing and on dark surfaces.
 //!
-//! In: exact depth in metres. Out: a [`DepthImage`] in sensor units, 0 where nothing was measured. Sources of the figures
+//! In: exact depth in metres and reflectance. Out: a [`DepthImage`] in sensor units, 0 where nothing was measured. Sources of the figures
 //! are in [`SensorConfig`].
 
 use rayon::prelude::*;
@@ -8,33 +9,74 @@ use yfslam::Camera;
 use yfslam::image::{DepthImage, Image};
 
 use crate::config::SensorConfig;
+use crate::render::Picture;
+use crate::render::rays::RayTable;
 use crate::rng::{hash, normals4};
 
-/// Measures a picture of exact depth.
-pub fn measure(exact: &[f32], camera: &Camera, sensor: &SensorConfig, seed: u64) -> DepthImage {
+/// Measures the exact depth of a picture.
+pub fn measure(exact: &Picture, rays: &RayTable, camera: &Camera, sensor: &SensorConfig, seed: u64) -> DepthImage {
     let (width, bf) = (camera.width, camera.bf as f32);
+    let least_cosine = sensor.max_angle_deg.to_radians().cos();
+    let by_angle = sensor.max_angle_deg < 90.0 || sensor.depth_noise_angle > 0.0 || sensor.min_return > 0.0;
     let mut raw = Image::<u16>::new(width, camera.height);
-    raw.data_mut().par_chunks_mut(width).zip(exact.par_chunks(width)).enumerate().for_each(|(row, (out, line))| {
-        let lit = sensor.holes.then(|| lit_by_projector(line, bf));
-        for (column, (unit, &z)) in out.iter_mut().zip(line).enumerate() {
-            if lit.as_ref().is_some_and(|lit| !lit[column]) || z <= 0.0 {
-                continue;
+    raw.data_mut().par_chunks_mut(width).zip(exact.depth.par_chunks(width)).enumerate().for_each(
+        |(row, (out, line))| {
+            let lit = sensor.holes.then(|| lit_by_projector(line, bf));
+            for (column, (unit, &z)) in out.iter_mut().zip(line).enumerate() {
+                if lit.as_ref().is_some_and(|lit| !lit[column]) || z <= 0.0 {
+                    continue;
+                }
+                let pixel = row * width + column;
+                let draws = normals4(hash(seed, pixel as u64));
+                let cosine = if by_angle { cosine(&exact.depth, rays, row, column) } else { 1.0 };
+                let returned = exact.reflectance[pixel] * cosine / (z * z);
+                if cosine * (1.0 + ANGLE_SPREAD * draws[1]) < least_cosine
+                    || returned * (1.0 + RETURN_SPREAD * draws[2]) < sensor.min_return
+                {
+                    continue;
+                }
+                let measured = disturb(z, bf, cosine, sensor, draws[0]);
+                if (sensor.min_depth_m..=sensor.max_depth_m).contains(&measured) {
+                    // Depth beyond the sixteen bits is no depth.
+                    // Rounds half up; `round` is a library call on older processors.
+                    let value = f64::from(measured) * camera.depth_factor + 0.5;
+                    *unit = if value < 65_536.0 { value as u16 } else { 0 };
+                }
             }
-            let bits = hash(seed, (row * width + column) as u64);
-            let measured = disturb(z, bf, sensor, normals4(bits)[0]);
-            if (sensor.min_depth_m..=sensor.max_depth_m).contains(&measured) {
-                // Depth beyond the sixteen bits is no depth.
-                // Rounds half up; `round` is a library call on older processors.
-                let value = f64::from(measured) * camera.depth_factor + 0.5;
-                *unit = if value < 65_536.0 { value as u16 } else { 0 };
-            }
-        }
-    });
+        },
+    );
     DepthImage { raw, metres_per_unit: (1.0 / camera.depth_factor) as f32 }
 }
 
-fn disturb(z: f32, bf: f32, sensor: &SensorConfig, normal: f32) -> f32 {
-    let sigma = sensor.depth_noise_m + sensor.depth_noise_growth * (z - 0.4).max(0.0).powi(2);
+/// Relative spread of the angle and of the returned light at which depth is lost: holes have ragged borders.
+const ANGLE_SPREAD: f32 = 0.15;
+const RETURN_SPREAD: f32 = 0.2;
+
+/// Cosine of the angle between the surface's normal and the ray, from the inverse depths around the pixel: the plane n·P = 1 has
+/// 1/z = n·(x, y, 1). Depth edges look like steep surfaces, and lose their depth as such.
+fn cosine(depth: &[f32], rays: &RayTable, row: usize, column: usize) -> f32 {
+    let (width, height) = (rays.width, rays.height);
+    let inverse = |row: usize, column: usize| {
+        let z = depth[row * width + column];
+        if z > 0.0 { 1.0 / z } else { 0.0 }
+    };
+    let ray = |row: usize, column: usize| row * rays.stride + column;
+    let (left, right) = (column.saturating_sub(1), (column + 1).min(width - 1));
+    let (up, down) = (row.saturating_sub(1), (row + 1).min(height - 1));
+    let (x, y, w) = (rays.x[ray(row, column)], rays.y[ray(row, column)], inverse(row, column));
+    let nx = (inverse(row, right) - inverse(row, left)) / (rays.x[ray(row, right)] - rays.x[ray(row, left)]);
+    let ny = (inverse(down, column) - inverse(up, column)) / (rays.y[ray(down, column)] - rays.y[ray(up, column)]);
+    let nz = w - nx * x - ny * y;
+    w / ((nx * nx + ny * ny + nz * nz) * (x * x + y * y + 1.0)).sqrt()
+}
+
+fn disturb(z: f32, bf: f32, cosine: f32, sensor: &SensorConfig, normal: f32) -> f32 {
+    let mut sigma = sensor.depth_noise_m + sensor.depth_noise_growth * (z - 0.4).max(0.0).powi(2);
+    if sensor.depth_noise_angle > 0.0 && cosine < STEEP_COSINE {
+        let angle = cosine.min(1.0).acos();
+        let ratio = angle / (std::f32::consts::FRAC_PI_2 - angle).max(0.05);
+        sigma += sensor.depth_noise_angle / z.sqrt() * ratio * ratio;
+    }
     let noisy = (z + sigma * normal).max(1e-3);
     if sensor.disparity_step_px > 0.0 && bf > 0.0 {
         let steps = ((bf / noisy / sensor.disparity_step_px + 0.5) as u32).max(1) as f32;
@@ -43,6 +85,9 @@ fn disturb(z: f32, bf: f32, sensor: &SensorConfig, normal: f32) -> f32 {
         noisy
     }
 }
+
+/// Cosine of 60°: flatter surfaces show no effect of the angle (Nguyen et al. 2012, section 2.4).
+const STEEP_COSINE: f32 = 0.5;
 
 /// Which pixels of a row the projector reaches. It stands to the right of the camera by the baseline: a point at column
 /// x and depth z lies at x − bf/z in its view, and is hidden if a pixel farther right lies at or left of that.
@@ -70,10 +115,50 @@ mod tests {
         Camera { width: 200, height: 100, ..default_camera() }
     }
 
+    /// Measures surfaces of this depth and reflectance.
+    fn measured(exact: Vec<f32>, reflectance: f32, sensor: &SensorConfig) -> DepthImage {
+        let pixels = exact.len();
+        let picture = Picture { depth: exact, reflectance: vec![reflectance; pixels], ..Picture::default() };
+        measure(&picture, &RayTable::new(&camera()), &camera(), sensor, 1)
+    }
+
+    fn missing(image: &DepthImage) -> f64 {
+        image.raw.data().iter().filter(|&&raw| raw == 0).count() as f64 / image.raw.data().len() as f64
+    }
+
+    #[test]
+    fn a_wall_loses_its_depth_when_seen_at_a_grazing_angle() {
+        // A wall through (0, 0, 2) whose normal makes `degrees` with the axis of a camera of long focal length.
+        let wall = |degrees: f32| -> Vec<f32> {
+            let slope = degrees.to_radians().tan();
+            (0..20_000).map(|i| 2.0 / (1.0 - slope * ((i % 200) as f32 - 100.0) / 20_000.0)).collect()
+        };
+        let long = Camera { fx: 20_000.0, fy: 20_000.0, cx: 100.0, cy: 50.0, ..camera() };
+        let lost = |degrees: f32| {
+            let depth = wall(degrees);
+            let picture = Picture { reflectance: vec![0.5; depth.len()], depth, ..Picture::default() };
+            let sensor = SensorConfig { max_angle_deg: 80.0, ..SensorConfig::perfect() };
+            missing(&measure(&picture, &RayTable::new(&long), &long, &sensor, 1))
+        };
+        assert_eq!((lost(0.0), lost(60.0)), (0.0, 0.0));
+        assert!((0.2..0.8).contains(&lost(80.0)), "{}", lost(80.0));
+        assert!(lost(86.0) > 0.97, "{}", lost(86.0));
+    }
+
+    #[test]
+    fn a_dark_surface_loses_its_depth_when_it_is_far() {
+        let sensor = SensorConfig { min_return: 0.005, ..SensorConfig::perfect() };
+        let lost = |reflectance: f32, z: f32| missing(&measured(vec![z; 20_000], reflectance, &sensor));
+        assert_eq!((lost(0.5, 4.5), lost(0.04, 1.5)), (0.0, 0.0));
+        assert!(lost(0.04, 4.0) > 0.95, "{}", lost(0.04, 4.0));
+        let border = lost(0.04, 0.04f32.sqrt() / 0.005f32.sqrt());
+        assert!((0.3..0.8).contains(&border), "{border}");
+    }
+
     #[test]
     fn the_perfect_sensor_only_rounds_to_the_unit() {
         let exact: Vec<f32> = (0..20_000).map(|i| 0.3 + i as f32 * 4e-4).collect();
-        let image = measure(&exact, &camera(), &SensorConfig::perfect(), 1);
+        let image = measured(exact.clone(), 0.5, &SensorConfig::perfect());
         for (i, &z) in exact.iter().enumerate() {
             let got = image.metres(i % 200, i / 200).unwrap();
             assert!((got - z).abs() <= 0.000_101, "{got} for {z}");
@@ -84,12 +169,12 @@ mod tests {
     fn noise_has_the_stated_spread_and_depth_comes_in_disparity_steps() {
         let exact = vec![3.0; 20_000];
         let smooth = SensorConfig { disparity_step_px: 0.0, ..SensorConfig::default() };
-        let image = measure(&exact, &camera(), &smooth, 1);
+        let image = measured(exact.clone(), 0.5, &smooth);
         let errors: Vec<f64> = image.raw.data().iter().map(|&raw| f64::from(raw) / 5000.0 - 3.0).collect();
         let sigma = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
         let want = 0.0012 + 0.0019 * 2.6 * 2.6;
         assert!((sigma / want - 1.0).abs() < 0.03, "{sigma} instead of {want}");
-        let mut values = measure(&exact, &camera(), &SensorConfig::default(), 1).raw.data().to_vec();
+        let mut values = measured(exact, 0.5, &SensorConfig::default()).raw.data().to_vec();
         values.sort_unstable();
         values.dedup();
         // One eighth of a pixel at bf = 40 is 28 mm at 3 m.
@@ -101,7 +186,7 @@ mod tests {
     fn a_near_object_shades_the_background_to_its_left_as_wide_as_the_difference_of_disparities() {
         let exact: Vec<f32> = (0..20_000).map(|i| if (80..120).contains(&(i % 200)) { 1.0 } else { 2.0 }).collect();
         let sensor = SensorConfig { holes: true, ..SensorConfig::perfect() };
-        let image = measure(&exact, &camera(), &sensor, 1);
+        let image = measured(exact, 0.5, &sensor);
         let holes: Vec<usize> = (0..200).filter(|&x| image.metres(x, 50).is_none()).collect();
         assert_eq!(holes, (61..80).collect::<Vec<_>>(), "40 px at 1 m less 20 px at 2 m, less the margin");
     }

@@ -59,6 +59,12 @@ impl Texture {
         self.levels[0].size
     }
 
+    /// Mean of linear light over the whole texture and its channels.
+    pub fn mean(&self) -> f32 {
+        let [r, g, b, _] = self.sample(0.5, 0.5, self.coarsest);
+        (r * r + g * g + b * b) / 3.0
+    }
+
     /// Gamma-2 colour at (u, v), clamped to [0, 1]²; `lod` is the mip level, 0 the finest, fractions blend two levels.
     /// The fourth channel is unused: four lanes fill a vector register.
     #[inline]

@@ -1,0 +1,123 @@
+//! `yfslam synth`: a synthetic world as a folder in TUM layout.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use rayon::prelude::*;
+use yfslam_io::boxes::{FrameBoxes, InstanceBox};
+use yfslam_io::write::ListedStamps;
+use yfslam_io::{BoxList, Delivery, Fault, FaultInjector, RecordingWriter, StampedPose};
+use yfslam_synth::{CLASS_NAMES, SUITE, SynthFrame, World};
+
+use crate::progress::Progress;
+use crate::source::SourceArgs;
+use crate::terminal::{Terminal, print};
+
+/// Frames in memory at a time, for each thread.
+const BATCH_PER_THREAD: usize = 4;
+
+const EXAMPLES: &str = "\
+Examples:
+  yfslam synth --list
+  yfslam synth walking_xyz --out walk && yfslam run walk
+  yfslam synth 'sitting_rpy?seed=7&frames=900' --camera tum1 --out sit
+  yfslam synth walking_static --fault covered@2+1 --fault nan-stamp@5+0.5 --out faulty
+
+In the folder:
+  rgb/ depth/ rgb.txt depth.txt associations.txt   as the TUM RGB-D benchmark has them
+  groundtruth.txt  the exact pose of every frame, whatever faults were put in
+  camera.toml      the camera
+  boxes.json       class, instance and exact box of everything that can move; `yfslam run` takes them where no --detector is given
+  masks/           per frame, named by its time: 0 where the world stands still, else the instance
+  world.toml       every setting of the world";
+
+/// Write a synthetic world to a folder: colour, depth, exact poses, boxes and masks.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct SynthArgs {
+    /// Which world, such as `walking_xyz` or `walking_xyz?seed=7&people=3&frames=300`.
+    #[arg(value_name = "WORLD", required_unless_present = "list")]
+    world: Option<String>,
+    /// The folder to write.
+    #[arg(long, value_name = "DIR", required_unless_present = "list")]
+    out: Option<PathBuf>,
+    /// List the worlds that have a name.
+    #[arg(long)]
+    list: bool,
+    /// Replace a recording that is there already.
+    #[arg(long)]
+    force: bool,
+    /// The camera: tum1, tum2, tum3, bonn, or a settings file [default: tum3, which has no distortion].
+    #[arg(long, value_name = "PRESET|FILE")]
+    camera: Option<String>,
+    /// Put a fault into the recording, as in `yfslam run`; can be given several times.
+    #[arg(long = "fault", value_name = "KIND@START+SECONDS")]
+    faults: Vec<Fault>,
+}
+
+pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
+    let (world, out) = match (&args.world, &args.out) {
+        _ if args.list => return list(),
+        (Some(world), Some(out)) => (world, out),
+        _ => bail!("name a world and a folder, as in `yfslam synth walking_xyz --out walk`; --list lists the worlds"),
+    };
+    let mut source = SourceArgs::new(world.clone());
+    source.camera.clone_from(&args.camera);
+    let config = source.world()?;
+    // Before the long work: the folder may be in use.
+    let mut writer = RecordingWriter::create(out, args.force)?;
+    let world = World::new(&config)?;
+    let mut progress = Progress::new(terminal, "rendering", world.len());
+    let mut injector = FaultInjector::new(args.faults.clone(), world.timestamp_ns(0));
+    let mut boxes = BoxList { classes: CLASS_NAMES.map(str::to_owned).to_vec(), frames: Vec::new() };
+    let (mut number, mut offset_ns) = (0, 0);
+    let batch = BATCH_PER_THREAD * rayon::current_num_threads();
+    for start in (0..world.len()).step_by(batch) {
+        let end = (start + batch).min(world.len());
+        let shots: Vec<SynthFrame> = (start..end).into_par_iter().map(|index| world.frame(index)).collect();
+        shots.par_iter().try_for_each(|shot| writer.write_mask(shot.frame.timestamp_ns, &shot.instances))?;
+        for shot in shots {
+            boxes.frames.push(frame_boxes(&shot));
+            offset_ns = shot.depth_timestamp_ns - shot.frame.timestamp_ns;
+            injector.push(shot.frame);
+        }
+        if end == world.len() {
+            injector.finish();
+        }
+        let deliveries: Vec<Delivery> = std::iter::from_fn(|| injector.pop()).collect();
+        deliveries.par_iter().enumerate().try_for_each(|(k, d)| writer.write_images(number + k, &d.frame))?;
+        for delivery in &deliveries {
+            let stamp = delivery.has_stamp.then_some(delivery.frame.timestamp_ns);
+            writer.list(number, ListedStamps { color_ns: stamp, depth_ns: stamp.map(|ns| ns + offset_ns) });
+            number += 1;
+        }
+        progress.at(end, String::new);
+    }
+    progress.finish();
+    writer.write_text("world.toml", &toml::to_string(&config)?)?;
+    let truth = |index| StampedPose { timestamp_ns: world.timestamp_ns(index), pose: world.pose(index) };
+    writer.finish(&config.camera, &(0..world.len()).map(truth).collect::<Vec<_>>(), &boxes)?;
+    terminal.result(&format!(
+        "{} frames of {} px × {} px, people cover {:.0} % of the view; written to {}\n",
+        world.len(),
+        config.camera.width,
+        config.camera.height,
+        100.0 * world.person_share(),
+        out.display()
+    ))
+}
+
+fn list() -> Result<()> {
+    let width = SUITE.iter().map(|world| world.name.len()).max().unwrap_or(0);
+    print(&SUITE.iter().map(|world| format!("{:width$}  {}\n", world.name, world.about)).collect::<String>())
+}
+
+fn frame_boxes(shot: &SynthFrame) -> FrameBoxes {
+    let boxes = shot.boxes.iter().map(|(instance, b)| InstanceBox {
+        instance: *instance,
+        class: CLASS_NAMES[0].to_owned(),
+        bbox: [b.x_min, b.y_min, b.x_max, b.y_max],
+    });
+    FrameBoxes { timestamp_ns: shot.frame.timestamp_ns, boxes: boxes.collect() }
+}

@@ -1,0 +1,102 @@
+//! `yfslam synth`: what it writes is what the world in process shows.
+#![allow(clippy::unwrap_used, reason = "a test may")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{ate_rmse, fails, report, succeeds};
+use serde_json::Value;
+use yfslam_synth::{World, parse_with_camera};
+
+const WORLD: &str = "walking_xyz?people=2&share=0.3&width=320&height=240&frames=16";
+
+fn same_trajectory(a: &Path, b: &Path) {
+    for name in ["trajectory.txt", "keyframes.txt", "live.txt", "map.ply"] {
+        assert_eq!(fs::read(a.join(name)).unwrap(), fs::read(b.join(name)).unwrap(), "{name} differs");
+    }
+}
+
+#[test]
+fn a_written_world_is_tracked_to_the_same_bits_as_the_world_in_process_boxes_and_lens_included() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let (world, camera) = (format!("synth:{WORLD}"), ["--camera", "tum1"]);
+    succeeds(root, &[&["synth", WORLD, "--out", "rec", "-q"], &camera[..]].concat());
+    for (part, options) in [("forward", &[][..]), ("backward", &["--reverse", "--start", "2"])] {
+        let (a, b) = (format!("a/{part}"), format!("b/{part}"));
+        succeeds(root, &[&["run", &world, "--out", &a, "-q"], &camera[..], options].concat());
+        let output = succeeds(root, &[&["run", "rec", "--out", &b], options].concat());
+        assert!(output.stderr.contains("boxes.json"), "{}", output.stderr);
+        same_trajectory(&root.join(a), &root.join(&b));
+        let report = report(&root.join(b));
+        assert_eq!(report["boxes"], "folder");
+        assert!(report["dynamic"]["boxes"].as_u64().unwrap() > 0);
+        assert!(ate_rmse(&report) < 0.02, "{part}: {}", ate_rmse(&report));
+    }
+}
+
+#[test]
+fn boxes_masks_settings_and_lists_are_those_of_the_world() {
+    let folder = tempfile::tempdir().unwrap();
+    let rec = folder.path().join("rec");
+    succeeds(folder.path(), &["synth", WORLD, "--out", "rec", "-q"]);
+    let config: yfslam_synth::WorldConfig =
+        toml::from_str(&fs::read_to_string(rec.join("world.toml")).unwrap()).unwrap();
+    assert_eq!(config, parse_with_camera(WORLD, yfslam_synth::default_camera()).unwrap());
+    let world = World::new(&config).unwrap();
+    let boxes: Value = serde_json::from_str(&fs::read_to_string(rec.join("boxes.json")).unwrap()).unwrap();
+    assert_eq!(boxes["frames"].as_array().unwrap().len(), 16);
+    let shot = world.frame(9);
+    let known = &boxes["frames"][9];
+    assert_eq!(known["timestamp_ns"], shot.frame.timestamp_ns);
+    assert_eq!(known["boxes"].as_array().unwrap().len(), shot.boxes.len());
+    for (known, (instance, bbox)) in known["boxes"].as_array().unwrap().iter().zip(&shot.boxes) {
+        assert_eq!((&known["instance"], &known["class"]), (&(*instance).into(), &"person".into()));
+        assert_eq!(known["bbox"][2], f64::from(bbox.x_max));
+    }
+    let stamp = yfslam_io::time::format_stamp(shot.frame.timestamp_ns);
+    let mut mask = yfslam::image::RgbImage::default();
+    let bytes = fs::read(rec.join(format!("masks/{stamp}.png"))).unwrap();
+    yfslam_io::decode::decode_color(&bytes, None, &mut mask).unwrap();
+    assert!(mask.data().iter().map(|rgb| rgb[0]).eq(shot.instances.data().iter().copied()));
+    for list in ["rgb.txt", "depth.txt", "associations.txt", "groundtruth.txt"] {
+        let text = fs::read_to_string(rec.join(list)).unwrap();
+        assert_eq!(text.lines().filter(|line| !line.starts_with('#')).count(), 16, "{list}");
+    }
+}
+
+#[test]
+fn a_folder_in_use_is_left_alone_unless_it_is_a_recording_and_may_be_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let small = "walking_static?people=0&width=64&height=48&frames=3";
+    fs::create_dir(root.join("mine")).unwrap();
+    fs::write(root.join("mine/thesis.txt"), "years").unwrap();
+    fails(root, &["synth", small, "--out", "mine"], &["mine", "holds something already", "--force"]);
+    fails(root, &["synth", small, "--out", "mine", "--force"], &["is no recording"]);
+    assert_eq!(fs::read_to_string(root.join("mine/thesis.txt")).unwrap(), "years");
+    fs::create_dir(root.join("rec")).unwrap();
+    succeeds(root, &["synth", small, "--out", "rec"]);
+    fails(root, &["synth", small, "--out", "rec"], &["--force"]);
+    succeeds(root, &["synth", "walking_static?people=0&width=64&height=48&frames=2", "--out", "rec", "--force"]);
+    assert_eq!(fs::read_dir(root.join("rec/rgb")).unwrap().count(), 2);
+    fails(root, &["synth", "walking_sideways", "--out", "new"], &["walking_sideways", "walking_xyz"]);
+    let mut left: Vec<_> = fs::read_dir(root).unwrap().map(|e| e.unwrap().file_name()).collect();
+    left.sort();
+    assert_eq!(left, ["mine", "rec"], "nothing temporary stays");
+}
+
+#[test]
+fn the_list_tells_every_name_and_each_can_be_rendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = succeeds(folder.path(), &["synth", "--list"]).stdout;
+    assert_eq!(text.lines().count(), yfslam_synth::SUITE.len());
+    for name in yfslam_synth::names() {
+        assert!(text.lines().any(|line| line.starts_with(name) && line.len() > name.len() + 20), "{name}: {text}");
+        let spec = format!("{name}?width=64&height=48&frames=2");
+        succeeds(folder.path(), &["synth", &spec, "--out", name, "-q"]);
+    }
+    fails(folder.path(), &["synth"], &["--out", "WORLD"]);
+}

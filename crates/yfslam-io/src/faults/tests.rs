@@ -1,0 +1,107 @@
+use yfslam::{BoundingBox, Detection};
+
+use super::*;
+
+/// Frame `k` of 10 Hz: grey level and depth tell its number, one box.
+fn frame(k: i64) -> RgbdFrame {
+    let color = RgbImage::from_vec(4, 2, vec![[100 + k as u8; 3]; 8]).unwrap();
+    let raw = Image::from_vec(4, 2, vec![1000 + k as u16; 8]).unwrap();
+    let bbox = BoundingBox { x_min: k as f32, ..Default::default() };
+    RgbdFrame {
+        timestamp_ns: 7_000_000_000 + k * 100_000_000,
+        color: Arc::new(color),
+        depth: Arc::new(DepthImage { raw, metres_per_unit: 0.0002 }),
+        detections: Some(vec![Detection { class: 0, score: 1.0, bbox }]),
+    }
+}
+
+/// What becomes of ten frames.
+fn deliver(faults: &[&str]) -> Vec<Delivery> {
+    let faults = faults.iter().map(|text| text.parse().unwrap()).collect();
+    let mut injector = FaultInjector::new(faults, frame(0).timestamp_ns);
+    (0..10).for_each(|k| injector.push(frame(k)));
+    injector.finish();
+    std::iter::from_fn(|| injector.pop()).collect()
+}
+
+/// Numbers of the frames by their stamps.
+fn order(deliveries: &[Delivery]) -> Vec<i64> {
+    deliveries.iter().map(|d| (d.frame.timestamp_ns - 7_000_000_000) / 100_000_000).collect()
+}
+
+fn grey(delivery: &Delivery) -> u8 {
+    delivery.frame.color.data()[0][0]
+}
+
+fn depth(delivery: &Delivery) -> u16 {
+    delivery.frame.depth.raw.data()[0]
+}
+
+#[test]
+fn without_a_fault_frames_pass_unchanged() {
+    let passed = deliver(&["black@60+5", "blank@0.5+0"]);
+    assert_eq!(order(&passed), (0..10).collect::<Vec<_>>());
+    assert!(passed.iter().enumerate().all(|(k, d)| usize::from(grey(d)) == 100 + k && d.has_stamp));
+}
+
+#[test]
+fn a_fault_strikes_from_its_start_until_its_end() {
+    assert_eq!(order(&deliver(&["dropped@0.3+0.2"])), [0, 1, 2, 5, 6, 7, 8, 9]);
+}
+
+#[test]
+fn stamps_come_twice_out_of_order_or_not_at_all() {
+    assert_eq!(order(&deliver(&["repeated@0.8+0.2"])), [0, 1, 2, 3, 4, 5, 6, 7, 8, 8, 9, 9]);
+    assert_eq!(order(&deliver(&["late@0.2+0.4"])), [0, 1, 3, 2, 5, 4, 6, 7, 8, 9]);
+    assert_eq!(
+        order(&deliver(&["late@0.2+0.3"])),
+        [0, 1, 3, 2, 5, 4, 6, 7, 8, 9],
+        "the last one held comes after the next"
+    );
+    assert_eq!(order(&deliver(&["late@0.9+5"])), (0..10).collect::<Vec<_>>(), "nothing is held back for ever");
+    let unstamped = deliver(&["nan-stamp@0.4+0.2"]);
+    assert_eq!((0..10).filter(|&k| !unstamped[k].has_stamp).collect::<Vec<_>>(), [4, 5]);
+}
+
+#[test]
+fn pictures_go_white_black_dark_or_stay() {
+    for (fault, expected) in [("blank@0.3+0.1", 255), ("black@0.3+0.1", 0)] {
+        let struck = &deliver(&[fault])[3];
+        assert_eq!((grey(struck), depth(struck)), (expected, 1003));
+        assert!(struck.frame.detections.as_ref().unwrap().is_empty());
+    }
+    let covered = &deliver(&["covered@0.3+0.1"])[3];
+    assert!(covered.frame.color.data().iter().flatten().all(|v| (4..20).contains(v)) && depth(covered) == 0);
+    let blind = &deliver(&["depth-dropout@0.3+0.1"])[3];
+    assert_eq!((grey(blind), depth(blind), blind.frame.detections.as_ref().unwrap().len()), (103, 0, 1));
+    let frozen = deliver(&["frozen@0.3+0.3"]);
+    assert_eq!(frozen.iter().map(grey).collect::<Vec<_>>(), [100, 101, 102, 103, 103, 103, 106, 107, 108, 109]);
+    assert_eq!(frozen.iter().map(depth).collect::<Vec<_>>()[3..7], [1003, 1003, 1003, 1006]);
+    assert_eq!(frozen[5].frame.detections, frozen[3].frame.detections);
+    assert_eq!(order(&frozen), (0..10).collect::<Vec<_>>());
+}
+
+#[test]
+fn faults_at_the_same_time_add_up() {
+    let both = deliver(&["black@0.3+0.1", "depth-dropout@0.3+0.1", "repeated@0.3+0.1"]);
+    assert!(both[3..5].iter().all(|d| (grey(d), depth(d)) == (0, 0)));
+    assert_eq!(order(&both)[3..5], [3, 3]);
+}
+
+#[test]
+fn what_is_no_fault_is_refused_with_the_format_and_all_kinds() {
+    for (text, words) in [
+        ("blak@1+2", "unknown kind 'blak'"),
+        ("black", "has no '@' and '+'"),
+        ("black@1", "has no '@' and '+'"),
+        ("black@x+2", "start 'x' is not a number"),
+        ("black@1+-2", "duration '-2' is negative"),
+        ("black@1+nan", "duration 'nan' is not a number"),
+    ] {
+        let error = text.parse::<Fault>().unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains("KIND@START+SECONDS"), "{error}");
+        assert!(FaultKind::ALL.iter().all(|(name, ..)| error.contains(name)), "{error}");
+    }
+    let fault: Fault = "covered@4+1.5".parse().unwrap();
+    assert_eq!(fault.to_string().parse::<Fault>().unwrap(), fault);
+}

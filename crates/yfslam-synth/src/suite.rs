@@ -1,0 +1,76 @@
+//! The standing suite: worlds with names, each hard in one way.
+//!
+//! In: a name. Out: what differs from [`WorldConfig::default`]. The eight `sitting_*` and `walking_*` follow the freiburg3 sequences of
+//! the TUM RGB-D benchmark (Sturm et al., IROS 2012).
+
+use crate::config::{Activity, CameraMotion, WorldConfig};
+
+/// A world of the suite.
+#[derive(Clone, Copy, Debug)]
+pub struct NamedWorld {
+    /// Name in specs, such as `walking_xyz`.
+    pub name: &'static str,
+    /// What happens in it, one line.
+    pub about: &'static str,
+    set: fn(&mut WorldConfig),
+}
+
+/// The world that an empty name means.
+pub const DEFAULT_NAME: &str = "walking_xyz";
+
+const fn world(name: &'static str, about: &'static str, set: fn(&mut WorldConfig)) -> NamedWorld {
+    NamedWorld { name, about, set }
+}
+
+/// All worlds of the suite, in the order of tables.
+pub const SUITE: &[NamedWorld] = &[
+    world("sitting_static", "people sit at the desk and gesture; the camera is held still", |c| {
+        sitting(c, CameraMotion::Static);
+    }),
+    world("sitting_xyz", "people sit and gesture; the camera moves along its three axes", |c| {
+        sitting(c, CameraMotion::Xyz);
+    }),
+    world("sitting_rpy", "people sit and gesture; the camera rolls, pitches and yaws", |c| {
+        sitting(c, CameraMotion::Rpy);
+    }),
+    world("sitting_halfsphere", "people sit and gesture; the camera moves on a half sphere", |c| {
+        sitting(c, CameraMotion::Halfsphere);
+    }),
+    world("walking_static", "people walk through the picture; the camera is held still", |c| {
+        walking(c, CameraMotion::Static);
+    }),
+    world("walking_xyz", "people walk through the picture; the camera moves along its three axes", |c| {
+        walking(c, CameraMotion::Xyz);
+    }),
+    world("walking_rpy", "people walk through the picture; the camera rolls, pitches and yaws", |c| {
+        walking(c, CameraMotion::Rpy);
+    }),
+    world("walking_halfsphere", "people walk through the picture; the camera moves on a half sphere", |c| {
+        walking(c, CameraMotion::Halfsphere);
+    }),
+];
+
+fn sitting(config: &mut WorldConfig, motion: CameraMotion) {
+    (config.activity, config.motion) = (Activity::Sitting, motion);
+}
+
+fn walking(config: &mut WorldConfig, motion: CameraMotion) {
+    (config.activity, config.motion) = (Activity::Walking, motion);
+}
+
+impl NamedWorld {
+    /// Sets what makes this world.
+    pub(crate) fn apply(&self, config: &mut WorldConfig) {
+        (self.set)(config);
+    }
+}
+
+/// Names of all worlds of the suite.
+pub fn names() -> Vec<&'static str> {
+    SUITE.iter().map(|world| world.name).collect()
+}
+
+/// The world of that name.
+pub fn find(name: &str) -> Option<&'static NamedWorld> {
+    SUITE.iter().find(|world| world.name == name)
+}
