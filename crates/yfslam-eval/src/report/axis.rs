@@ -60,7 +60,7 @@ impl Axis {
         let low = exponent(from).floor();
         let high = exponent(to).ceil().max(low + 1.0);
         let decades = (high - low) as i32;
-        let ticks = (0..=decades).map(|k| low + f64::from(k)).map(|e| (e, length(10f64.powf(e)))).collect();
+        let ticks = (0..=decades).map(|k| low + f64::from(k)).map(|e| (e, trimmed(&length(10f64.powf(e))))).collect();
         Self { name: name.into(), scale: Scale::Log, range: [low, high], ticks }
     }
 
@@ -92,25 +92,31 @@ pub fn length_unit(max_m: f64) -> (&'static str, f64) {
     }
 }
 
-/// A length in metres as people say it.
+/// A length in metres as people say it, with three digits.
 pub fn length(m: f64) -> String {
     match m {
-        m if m < 0.000_999 => format!("{} µm", short(m * 1e6)),
-        m if m < 0.009_99 => format!("{} mm", short(m * 1e3)),
-        m if m < 0.999 => format!("{} cm", short(m * 1e2)),
+        m if m < 0.000_999_5 => format!("{} µm", short(m * 1e6)),
+        m if m < 0.009_995 => format!("{} mm", short(m * 1e3)),
+        m if m < 0.999_5 => format!("{} cm", short(m * 1e2)),
         m => format!("{} m", short(m)),
     }
 }
 
-/// Three significant digits at most.
+/// Three significant digits.
 fn short(value: f64) -> String {
     let decimals = match value {
         v if v >= 99.95 => 0,
         v if v >= 9.995 => 1,
         _ => 2,
     };
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    format!("{value:.decimals$}")
+}
+
+/// Without zeros behind the point.
+fn trimmed(length: &str) -> String {
+    let Some((number, unit)) = length.split_once(' ') else { return length.to_owned() };
+    let number = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number };
+    format!("{number} {unit}")
 }
 
 /// The 1, 2 or 5 times a power of ten that is next to `rough` or above.
@@ -141,7 +147,9 @@ mod tests {
     fn logarithmic_axes_name_lengths_in_their_own_unit() {
         assert_eq!(labels(&Axis::log_lengths("", [0.0013, 0.8])), ["1 mm", "1 cm", "10 cm", "1 m"]);
         assert_eq!(length(0.0156), "1.56 cm");
-        assert_eq!(length(12.0), "12 m");
+        assert_eq!(length(0.041), "4.10 cm");
+        assert_eq!(length(0.999_6), "1.00 m");
+        assert_eq!(length(12.0), "12.0 m");
         assert_eq!(length(0.000_12), "120 µm");
     }
 

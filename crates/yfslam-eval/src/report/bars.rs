@@ -1,11 +1,11 @@
 //! In: errors of all methods. Out: bars of RMSE and S.D. (paper Fig. 6).
 
 use super::Report;
-use super::axis::{Axis, length_unit};
+use super::axis::Axis;
 use super::figure::{Figure, Mark};
 use super::scene::{Captioned, LOG_FROM_RATIO, Scene, WIDTH, bounds};
 
-const HEIGHT: f64 = 270.0;
+const HEIGHT: f64 = 330.0;
 /// Width of a bar, as a share of the distance between two groups of bars.
 const WIDEST_BAR: f64 = 0.24;
 
@@ -23,10 +23,9 @@ pub fn bars(report: &Report, scene: &Scene) -> Option<Captioned> {
     let [smallest, largest] = bounds(methods.iter().flat_map(|(_, s)| [s.rmse, s.std]))?;
     let is_log = smallest > 0.0 && largest / smallest > LOG_FROM_RATIO;
     let y = if is_log {
-        Axis::log_lengths("ATE, logarithmic", [smallest / 2.0, largest * 1.3])
+        Axis::log_lengths("ATE, logarithmic; bars in m", [smallest / 2.0, largest * 1.3])
     } else {
-        let (unit, per_m) = length_unit(largest);
-        Axis::linear(format!("ATE ({unit})"), [0.0, largest.max(1e-6) * 1.15], 4, per_m)
+        Axis::linear("ATE (m)", [0.0, largest.max(1e-6) * 1.15], 4, 1.0)
     };
     let width = (0.8 / methods.len() as f64).min(WIDEST_BAR);
     let mut marks = Vec::new();
@@ -38,7 +37,7 @@ pub fn bars(report: &Report, scene: &Scene) -> Option<Captioned> {
         }
     }
     let title = "RMSE and standard deviation of the ATE".to_owned();
-    let x = Axis::groups(&["RMSE (m)", "S.D. (m)"]);
+    let x = Axis::groups(&["RMSE", "S.D."]);
     let figure = Figure { description: title.clone(), size: [WIDTH, HEIGHT], x, y, marks };
     Some(Captioned { svg: figure.svg(), title, note: String::new() })
 }

@@ -40,6 +40,8 @@ pub struct Report<'a> {
     pub methods: Vec<MethodReport<'a>>,
     /// Stages that all methods share, such as rendering.
     pub shared_stages: Vec<Stage>,
+    /// Wall time from the first frame to the last, of everything together, s.
+    pub wall_s: f64,
     /// Version of the program.
     pub version: &'a str,
     /// The command that gives this report again.
@@ -85,8 +87,8 @@ pub struct Frames {
 pub struct Times {
     /// Wall time of the stages.
     pub stages: Vec<Stage>,
-    /// From the first frame to the last, of everything together, s.
-    pub wall_s: f64,
+    /// Wall time of tracking alone, all frames together, s.
+    pub tracking_s: f64,
     /// Processor time of tracking and detection, all threads together, without reading or rendering, s; `None` where it is not known.
     pub cpu_s: Option<f64>,
 }
@@ -111,8 +113,8 @@ pub struct Picture {
     pub frame: usize,
     /// Why this moment is shown, if there is a reason.
     pub note: &'static str,
-    /// The picture as JPEG.
-    pub jpeg: Vec<u8>,
+    /// The picture as PNG.
+    pub png: Vec<u8>,
     /// Width and height, px.
     pub size: [usize; 2],
     /// Features that were trusted, and those that were not.
@@ -130,12 +132,5 @@ impl Frames {
     /// Share of all frames whose pose is known, %.
     pub fn tracked_percent(&self) -> f64 {
         if self.total == 0 { 0.0 } else { 100.0 * self.tracked as f64 / self.total as f64 }
-    }
-}
-
-impl Times {
-    /// Frames a second at which everything together ran.
-    pub fn fps(&self, frames: usize) -> f64 {
-        frames as f64 / self.wall_s.max(1e-9)
     }
 }

@@ -125,7 +125,7 @@ fn accuracy(report: &Report, scene: &Scene) -> Markup {
             }
             p.about {
                 "Absolute trajectory error (ATE) after alignment by rotation and translation; relative pose error (RPE) without. \
-                 Improvement is (1 − error / error of the first) · 100 %."
+                 Improvement is (1 − error / error of the first) · 100 %. S.D.: standard deviation."
             }
             div.pair {
                 (tables::errors(report))
@@ -162,8 +162,9 @@ fn errors(report: &Report, scene: &Scene) -> Markup {
         section #errors {
             h2 { "Error over time" }
             p.about {
-                "Distance, and angles about the camera's viewing direction (roll), right (pitch) and down (yaw), between the aligned estimate \
-                 and the ground truth."
+                "Distance between the aligned estimate and the ground truth, and angles between them about the camera's viewing direction \
+                 (roll), its right (pitch) and its down (yaw). Angles are those that are left when the orientations are aligned: positions \
+                 along a line would not tell how the camera is turned about it."
                 @if scene.any_lost() { " Shaded: no pose." }
             }
             div.pair { @for one in &figures { (figure(scene, one, false)) } }
@@ -232,11 +233,11 @@ fn moment(method: &MethodReport, place: usize, picture: &Picture) -> Markup {
     html! {
         figure {
             img width=(width) height=(height) alt=(format!("frame {} under {}", picture.frame, method.name))
-                src=(format!("data:image/jpeg;base64,{}", STANDARD.encode(&picture.jpeg)));
+                src=(format!("data:image/png;base64,{}", STANDARD.encode(&picture.png)));
             figcaption {
                 b style=(color) { (method.name) }
                 " frame " (picture.frame) @if !picture.note.is_empty() { ", " (picture.note) }
-                ": " (used) " static, " (dropped) " dynamic"
+                ": " (used) " features used, " (dropped) " dropped"
             }
         }
     }
@@ -253,21 +254,24 @@ fn times(report: &Report) -> Markup {
             (tables::times(report))
             table.figures.totals {
                 thead {
-                    tr { th {} th { "wall time (s)" } th { "frames a second, all together" } th { "processor time (s)" } th { "a frame (ms)" } }
+                    tr { th {} th { "wall time (s)" } th { "frames a second" } th { "processor time (s)" } th { "a frame (ms)" } }
                 }
                 tbody {
                     @for (place, method) in report.methods.iter().enumerate() {
                         tr {
                             th style=(format!("color:var({})", Ink::method(method.name, place).variable())) { (method.name) }
-                            td { (format!("{:.2}", method.times.wall_s)) }
-                            td { (format!("{:.1}", method.times.fps(method.frames.total))) }
+                            td { (format!("{:.2}", method.times.tracking_s)) }
+                            td { (format!("{:.1}", method.frames.total as f64 / method.times.tracking_s.max(1e-9))) }
                             td { (method.times.cpu_s.map_or("–".into(), |s| format!("{s:.2}"))) }
                             td { (ms_per_frame(method).map_or("–".into(), |ms| format!("{ms:.2}"))) }
                         }
                     }
                 }
             }
-            p.about { "Processor time is that of tracking and detection, without reading or rendering." }
+            p.about {
+                "These are of tracking and detection alone. Everything together, reading or rendering included, took "
+                (format!("{:.2} s", report.wall_s)) "."
+            }
         }
     }
 }

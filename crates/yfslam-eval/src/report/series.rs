@@ -1,9 +1,9 @@
 //! In: what a report is given. Out: what its figures draw: trajectories in one world, errors over time, stretches without a pose.
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix4, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
 
 use super::{MethodReport, Report};
-use crate::{Alignment, StampedPose, associate};
+use crate::{Alignment, Match, StampedPose, associate};
 
 /// So many frames in a row without a pose count as a stretch: a frame that the sensor dropped is none.
 const SHORTEST_STRETCH: usize = 3;
@@ -115,15 +115,27 @@ fn gaps(frames_ns: &[i64], trajectory: &[StampedPose]) -> Vec<[i64; 2]> {
 fn errors(report: &Report, method: &MethodReport, alignment: &Alignment, clock: &Clock) -> Vec<Off> {
     let (Some(truth), Some(evaluation)) = (report.truth, method.evaluation) else { return Vec::new() };
     let matches = associate(truth, method.trajectory, evaluation.max_diff_ns).unwrap_or_default();
-    let off = |m: &crate::Match| {
-        let (truth, estimate) = (m.reference.t_world_cam, alignment.apply(&m.estimate).t_world_cam);
+    let turn = orientation_alignment(&matches);
+    let off = |m: &Match| {
+        let (truth, estimate) = (m.reference.t_world_cam, m.estimate.t_world_cam);
+        let aligned = alignment.apply(&m.estimate).t_world_cam;
         Off {
             time_s: clock.seconds(m.estimate.timestamp_ns),
-            translation_m: (truth.translation.vector - estimate.translation.vector).norm(),
-            rotation_deg: roll_pitch_yaw_deg(&(truth.rotation.inverse() * estimate.rotation)),
+            translation_m: (truth.translation.vector - aligned.translation.vector).norm(),
+            rotation_deg: roll_pitch_yaw_deg(&(truth.rotation.inverse() * turn * estimate.rotation)),
         }
     };
     matches.iter().map(off).collect()
+}
+
+/// The rotation of the estimate's world that brings its orientations closest to the true ones, in the least squares sense of their
+/// matrices: the mean of the rotations between them (Markley et al., "Averaging quaternions", 2007, equation 13).
+fn orientation_alignment(matches: &[Match]) -> UnitQuaternion<f64> {
+    let between = matches.iter().map(|m| m.reference.t_world_cam.rotation * m.estimate.t_world_cam.rotation.inverse());
+    let sum: Matrix4<f64> = between.map(|q| q.coords * q.coords.transpose()).sum();
+    let eigen = SymmetricEigen::new(sum);
+    let mean = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    UnitQuaternion::from_quaternion(Quaternion::from_vector(mean))
 }
 
 /// Angles of a rotation in the camera's frame (x right, y down, z ahead): roll about z, pitch about x, yaw about y.
@@ -178,5 +190,18 @@ mod tests {
         assert_eq!(angles(Vector3::z()), [10.0, 0.0, 0.0]);
         assert_eq!(angles(Vector3::x()), [0.0, 10.0, 0.0]);
         assert_eq!(angles(Vector3::y()), [0.0, 0.0, 10.0]);
+    }
+
+    #[test]
+    fn the_turn_between_two_worlds_is_found_from_orientations_alone() {
+        let turn = UnitQuaternion::new(Vector3::new(0.3, -1.2, 0.5));
+        let matched = |i: i64| {
+            let truth = Isometry3::rotation(Vector3::new(0.1, 0.02 * i as f64, 0.0));
+            let estimate = Isometry3::from_parts(nalgebra::Translation3::identity(), turn.inverse() * truth.rotation);
+            Match { reference: StampedPose::new(i, truth), estimate: StampedPose::new(i, estimate) }
+        };
+        let matches: Vec<Match> = (0..30).map(matched).collect();
+        assert!(orientation_alignment(&matches).angle_to(&turn) < 1e-9);
+        assert!(orientation_alignment(&[]).angle().is_finite());
     }
 }

@@ -21,12 +21,17 @@ pub fn errors(report: &Report) -> Markup {
         div.scroll {
             table.figures {
                 thead {
+                    @if let (Some(first), false) = (baseline, others.is_empty()) {
+                        tr.groups {
+                            th {}
+                            th colspan=(report.methods.len()) {}
+                            th.improve colspan=(others.len()) { "improvement on " (first.name) }
+                        }
+                    }
                     tr {
                         th {}
                         @for (place, method) in report.methods.iter().enumerate() { (method_heading(method, place)) }
-                        @for method in others {
-                            th.improve { (method.name) @if let Some(first) = baseline { " against " (first.name) } }
-                        }
+                        @for (place, method) in others.iter().enumerate() { (method_heading(method, place + 1)) }
                     }
                 }
                 tbody {
@@ -81,7 +86,7 @@ fn rows(report: &Report) -> Vec<Row> {
         ("S.D.", "std", |s| s.std),
         ("mean", "mean", |s| s.mean),
         ("median", "median", |s| s.median),
-        ("largest", "max", |s| s.max),
+        ("max", "max", |s| s.max),
     ];
     let mut rows: Vec<Row> = picks
         .into_iter()

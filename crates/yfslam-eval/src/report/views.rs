@@ -37,11 +37,13 @@ pub fn views(scene: &Scene) -> Vec<Captioned> {
 }
 
 fn view(scene: &Scene, title: &str, x: &Direction, y: &Direction) -> Option<Captioned> {
-    let ((x_range, x_cut), (y_range, y_cut)) = (range(scene, x)?, range(scene, y)?);
+    let extent_m = |d| bounds(shown(scene).map(|at| Direction::of(d, at))).map(|[low, high]| high - low);
+    let room_m = (ROOM - 1.0) / 2.0 * extent_m(x)?.max(extent_m(y)?).max(LEAST_M);
+    let ((x_range, x_cut), (y_range, y_cut)) = (range(scene, x, room_m)?, range(scene, y, room_m)?);
     // The same scale on both axes: as high as the width allows, within reason.
     let [plot_width, _] = plot_size([WIDTH, WIDTH]);
     let extent = |[low, high]: [f64; 2]| (high - low).max(LEAST_M) * 1.12;
-    let plot_height = (plot_width * extent(y_range) / extent(x_range)).clamp(130.0, 380.0);
+    let plot_height = (plot_width * extent(y_range) / extent(x_range)).clamp(180.0, 380.0);
     let m_per_px = (extent(x_range) / plot_width).max(extent(y_range) / plot_height);
     let around = |[low, high]: [f64; 2], px: f64| {
         let (middle, half) = ((low + high) / 2.0, m_per_px * px / 2.0);
@@ -88,10 +90,9 @@ fn shown<'a>(scene: &'a Scene) -> Box<dyn Iterator<Item = &'a At> + 'a> {
     }
 }
 
-/// What is shown along a direction, and whether estimates reach beyond it.
-fn range(scene: &Scene, direction: &Direction) -> Option<([f64; 2], bool)> {
+/// What is shown along a direction, at most `room` on either side of the truth, and whether estimates reach beyond it.
+fn range(scene: &Scene, direction: &Direction, room: f64) -> Option<([f64; 2], bool)> {
     let [low, high] = bounds(shown(scene).map(|at| direction.of(at)))?;
-    let room = (ROOM - 1.0) / 2.0 * (high - low).max(LEAST_M);
     let all = scene.methods.iter().flat_map(|m| m.series.track.iter().flatten());
     let [lowest, highest] = bounds(all.map(|at| direction.of(at))).unwrap_or([low, high]);
     let cut = scene.truth.is_some() && (lowest < low - room || highest > high + room);
