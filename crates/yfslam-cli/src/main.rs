@@ -7,8 +7,11 @@
 mod accuracy;
 mod cli;
 mod command;
+mod cpu;
 mod detector;
 mod draw;
+mod html;
+mod moments;
 mod output;
 mod overlay;
 mod pipeline;
