@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! WorldConfig ─► scene ─► textures, light maps ─┐
-//!                people (skeleton, gait, way) ──┼─► render ─► sensor ─► SynthFrame
+//!                actors (people, robots, things) ┼─► render ─► sensor ─► SynthFrame
 //!                camera path ───────────────────┘
 //! ```
 //!
@@ -18,12 +18,12 @@
 //! # }
 //! ```
 
+mod actors;
 mod bvh;
 mod camera_path;
 mod config;
 mod light;
 mod mesh;
-mod people;
 mod render;
 mod rng;
 mod scene;
@@ -32,8 +32,10 @@ mod spec;
 mod texture;
 mod world;
 
+pub use actors::CLASS_NAMES;
 pub use config::{
-    Activity, CameraMotion, LightConfig, MAX_PEOPLE, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera,
+    Activity, ActorsConfig, CameraMotion, LightConfig, MAX_PEOPLE, SceneKind, SensorConfig, WorldConfig, WorldError,
+    default_camera,
 };
 pub use spec::{is_spec, names, parse};
-pub use world::{CLASS_NAMES, SynthFrame, World};
+pub use world::{SynthFrame, World};

@@ -115,6 +115,19 @@ impl Mesh {
         });
     }
 
+    /// Appends `other`; `place(index, vertex)` gives each of its vertices.
+    pub fn append(&mut self, other: &Self, place: impl Fn(usize, &Vertex) -> Vertex) {
+        let (vertices, patches) = (self.vertices.len() as u32, self.patches.len() as u32);
+        self.vertices.extend(other.vertices.iter().enumerate().map(|(index, vertex)| place(index, vertex)));
+        self.triangles.extend(
+            other
+                .triangles
+                .iter()
+                .map(|t| Triangle { vertices: t.vertices.map(|v| v + vertices), patch: t.patch + patches }),
+        );
+        self.patches.extend(&other.patches);
+    }
+
     /// Moves everything from vertex `first` on.
     pub fn transform_from(&mut self, first: usize, pose: &Isometry3<f32>) {
         for vertex in self.vertices.iter_mut().skip(first) {

@@ -8,8 +8,13 @@ use crate::config::{Activity, CameraMotion, SensorConfig, WorldConfig, WorldErro
 const KEYS: &[(&str, &str)] = &[
     ("seed", "integer"),
     ("people", "0 to 6"),
+    ("activity", "sitting, walking or crowd"),
+    ("robots", "0 to 6, with the people at most 6"),
+    ("chair", "on or off: someone pushes a chair"),
+    ("carry", "on or off: someone carries a box"),
+    ("moved", "on or off: a box is displaced while out of view"),
     ("frames", "number of frames"),
-    ("share", "share of the view that people cover, 0 to 0.6"),
+    ("share", "share of the view that people cover, 0 to 0.8"),
     ("width", "px"),
     ("height", "px"),
     ("fps", "frames per second"),
@@ -63,6 +68,14 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
     match key {
         "seed" => config.seed = number(key, value)?,
         "people" => config.people = number(key, value)?,
+        "activity" => {
+            let known = Activity::ALL.iter().find(|(name, _)| *name == value);
+            config.activity = known.ok_or_else(|| format!("`{key}={value}`: use sitting, walking or crowd"))?.1;
+        }
+        "robots" => config.actors.robots = number(key, value)?,
+        "chair" => config.actors.pushed_chair = switch(key, value)?,
+        "carry" => config.actors.carried_box = switch(key, value)?,
+        "moved" => config.actors.moved_object = switch(key, value)?,
         "frames" => config.frames = number(key, value)?,
         "share" => config.person_share = number(key, value)?,
         // The view stays the same when the size changes: intrinsics scale about the pixel grid's corner.
@@ -131,7 +144,7 @@ mod tests {
 
     #[test]
     fn every_listed_name_parses() {
-        assert_eq!(names().len(), 8);
+        assert_eq!(names().len(), 12);
         for name in names() {
             parse(&format!("synth:{name}")).unwrap();
         }

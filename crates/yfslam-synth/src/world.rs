@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use yfslam::image::Image;
 use yfslam::{BoundingBox, Camera, Detection, RgbdFrame};
 
+use crate::actors::Actors;
 use crate::camera_path::CameraPath;
 use crate::config::{WorldConfig, WorldError, default_camera};
 use crate::light::{LightMap, Lights, Occluder};
-use crate::people::People;
 use crate::render::rays::RayTable;
 use crate::render::shade::View;
 use crate::render::{self, Backdrop, Picture};
@@ -22,15 +22,12 @@ use crate::scene::Scene;
 use crate::sensor;
 use crate::texture::Texture;
 
-/// Names of the classes of [`SynthFrame`]'s detections, by [`Detection::class`].
-pub const CLASS_NAMES: [&str; 1] = ["person"];
-
 /// A synthetic sequence, ready to render.
 #[derive(Debug)]
 pub struct World {
     config: WorldConfig,
     scene: Scene,
-    people: People,
+    actors: Actors,
     path: CameraPath,
     textures: Vec<Texture>,
     light_maps: Vec<LightMap>,
@@ -45,12 +42,13 @@ pub struct SynthFrame {
     pub frame: RgbdFrame,
     /// Exact pose: world from camera.
     pub t_world_cam: Isometry3<f64>,
-    /// 0 where the world stands still, k where person k (from 1) is seen.
+    /// 0 where the world stands still, k where actor k (from 1) is seen.
     pub instances: Image<u8>,
     /// Depth along the optical axis in metres without any error; 0 where nothing is seen.
     pub exact_depth: Image<f32>,
-    /// Exact boxes of the people who are visible enough, in the order of their numbers.
-    pub boxes: Vec<(u8, BoundingBox)>,
+    /// Exact boxes of the actors that are visible enough, in the order of their numbers: number, class (an index into
+    /// [`CLASS_NAMES`](crate::CLASS_NAMES)), tight bounds of the visible pixels.
+    pub boxes: Vec<(u8, usize, BoundingBox)>,
 }
 
 impl World {
@@ -61,16 +59,16 @@ impl World {
     pub fn new(config: &WorldConfig) -> Result<Self, WorldError> {
         config.validate()?;
         let mut scene = Scene::new(config.scene, config.seed);
-        let people = People::new(&mut scene, config);
+        let path = CameraPath::new(config.motion, scene.camera, config.hand_shake, config.seed);
+        let actors = Actors::new(&mut scene, config, &path);
         // Textures for the default focal length suit any other when they have as many more or fewer texels.
         let sharpness = config.camera.fx.max(config.camera.fy) / default_camera().fx;
         let textures = scene.palette.paint(sharpness.clamp(0.05, 3.0) as f32);
         let lights = scene.lights.clone();
         let light_maps = lights.bake(&mut scene.mesh, config.light.shadow_rays);
-        let path = CameraPath::new(config.motion, scene.camera, config.hand_shake, config.seed);
         let rays = RayTable::new(&config.camera);
         let config = config.clone();
-        let mut world = Self { config, scene, people, path, textures, light_maps, rays, person_share: 0.0 };
+        let mut world = Self { config, scene, actors, path, textures, light_maps, rays, person_share: 0.0 };
         world.choose_distance();
         Ok(world)
     }
@@ -90,7 +88,7 @@ impl World {
         self.len() == 0
     }
 
-    /// Mean share of the picture that people cover over the sequence, estimated on small pictures of some frames.
+    /// Mean share of the picture that actors cover over the sequence, estimated on small pictures of some frames.
     pub fn person_share(&self) -> f64 {
         self.person_share
     }
@@ -118,7 +116,7 @@ impl World {
         let depth = sensor::depth::measure(&picture.depth, &self.config.camera, sensor, hash(noise, 1));
         let boxes = self.boxes(&picture.instance);
         let detections = self.config.detections.then(|| {
-            boxes.iter().map(|&(_, bbox)| Detection { class: 0, score: 1.0, bbox }).collect::<Vec<Detection>>()
+            boxes.iter().map(|&(_, class, bbox)| Detection { class, score: 1.0, bbox }).collect::<Vec<Detection>>()
         });
         SynthFrame {
             frame: RgbdFrame {
@@ -139,12 +137,12 @@ impl World {
     }
 
     fn render(&self, rays: &RayTable, time: f64, t_world_cam: &Isometry3<f64>) -> Picture {
-        let (people, occluders) = self.people.at(time, &self.scene.lights);
+        let (actors, occluders) = self.actors.at(time, &self.scene.lights);
         let t_cam_world = t_world_cam.inverse();
         let nearby =
             if self.config.light.moving_shadows { self.in_camera(&occluders, &t_cam_world) } else { Vec::new() };
         let view = View {
-            meshes: [&self.scene.mesh, &people],
+            meshes: [&self.scene.mesh, &actors],
             textures: &self.textures,
             light_maps: &self.light_maps,
             occluders: &nearby,
@@ -160,10 +158,10 @@ impl World {
         occluders.iter().map(|o| Occluder { center: moved(o), ..*o }).collect()
     }
 
-    /// Boxes around the visible pixels of everyone with enough of them.
-    fn boxes(&self, instances: &[u8]) -> Vec<(u8, BoundingBox)> {
+    /// Boxes around the visible pixels of every actor with enough of them.
+    fn boxes(&self, instances: &[u8]) -> Vec<(u8, usize, BoundingBox)> {
         let least = self.config.min_person_px as f64 * instances.len() as f64 / (640.0 * 480.0);
-        let mut found = vec![(0usize, [usize::MAX, usize::MAX, 0, 0]); self.config.people + 1];
+        let mut found = vec![(0usize, [usize::MAX, usize::MAX, 0, 0]); self.actors.len() + 1];
         for (i, &instance) in instances.iter().enumerate() {
             if instance > 0 {
                 let (x, y) = (i % self.rays.width, i / self.rays.width);
@@ -176,12 +174,12 @@ impl World {
         visible
             .map(|(instance, (_, [x0, y0, x1, y1]))| {
                 let bbox = BoundingBox { x_min: *x0 as f32, y_min: *y0 as f32, x_max: *x1 as f32, y_max: *y1 as f32 };
-                (instance, bbox)
+                (instance, self.actors.class(instance) as usize, bbox)
             })
             .collect()
     }
 
-    /// Searches how near people walk, so that they cover the wanted share of the picture.
+    /// Searches how near people and robots come, so that all actors cover the wanted share of the picture.
     fn choose_distance(&mut self) {
         const FRAMES: usize = 24;
         const WIDTH: usize = 48;
@@ -192,18 +190,18 @@ impl World {
             times.iter().map(|&t| Backdrop::new(&rays, self.path.pose(t).inverse(), &self.scene.mesh)).collect();
         // Light does not matter for the share.
         let dark = Lights::default();
-        let share = |people: &People| {
-            let shares = times.par_iter().zip(&backdrops).map(|(&t, b)| b.share(&rays, &people.at(t, &dark).0));
+        let share = |actors: &Actors| {
+            let shares = times.par_iter().zip(&backdrops).map(|(&t, b)| b.share(&rays, &actors.at(t, &dark).0));
             // Summed in order: a parallel sum would depend on the threads.
             shares.collect::<Vec<f64>>().iter().sum::<f64>() / count as f64
         };
-        if !self.people.anyone_walks() {
-            self.person_share = share(&self.people);
+        if !self.actors.anyone_walks() {
+            self.person_share = share(&self.actors);
             return;
         }
         let mut try_out = |closeness: f64| {
-            self.people.set_closeness(&self.scene, &self.config, closeness);
-            let reached = share(&self.people);
+            self.actors.set_closeness(&self.scene, &self.config, closeness);
+            let reached = share(&self.actors);
             ((reached - self.config.person_share).abs(), closeness, reached)
         };
         let mut best = try_out(-1.0);

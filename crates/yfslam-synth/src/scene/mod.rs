@@ -1,7 +1,7 @@
 //! Places: a static mesh, its lights, where the camera stands and where people may be.
 
 pub mod builder;
-mod furniture;
+pub mod furniture;
 mod office;
 
 use nalgebra::{Isometry3, Point3};

@@ -48,18 +48,12 @@ impl Body {
 
     /// Appends the body in the given pose to `out`, lit by `lights`.
     pub fn pose(&self, poses: &BonePoses, lights: &Lights, out: &mut Mesh) {
-        let (first_vertex, first_patch) = (out.vertices.len() as u32, out.patches.len() as u32);
-        out.vertices.extend(self.mesh.vertices.iter().zip(&self.bones).map(|(vertex, &bone)| {
-            let pose: &Isometry3<f32> = &poses[usize::from(bone)];
+        out.append(&self.mesh, |index, vertex| {
+            let pose: &Isometry3<f32> = &poses[usize::from(self.bones[index])];
             let position = (pose * Point3::from(vertex.position)).coords;
             let normal = pose.rotation * vertex.normal;
             crate::mesh::Vertex { position, normal, light: lights.on_vertex(&position, &normal), ..*vertex }
-        }));
-        out.triangles.extend(self.mesh.triangles.iter().map(|t| crate::mesh::Triangle {
-            vertices: t.vertices.map(|v| v + first_vertex),
-            patch: t.patch + first_patch,
-        }));
-        out.patches.extend(&self.mesh.patches);
+        });
     }
 }
 
