@@ -4,6 +4,7 @@
 
 pub mod body;
 pub mod gait;
+mod head;
 pub mod skeleton;
 pub mod tasks;
 
