@@ -205,15 +205,15 @@ impl World {
             ((reached - self.config.person_share).abs(), closeness, reached)
         };
         let mut best = try_out(-1.0);
-        let mut step = 0.25;
-        for k in -3..=4 {
+        let mut step = 0.5;
+        for k in -1..=4 {
             let tried = try_out(f64::from(k) * step);
             best = if tried.0 < best.0 { tried } else { best };
         }
         for _ in 0..4 {
             step /= 2.0;
             for closeness in [best.1 - step, best.1 + step] {
-                let tried = try_out(closeness.min(1.0));
+                let tried = try_out(closeness.min(2.0));
                 best = if tried.0 < best.0 { tried } else { best };
             }
         }

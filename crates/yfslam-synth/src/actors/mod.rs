@@ -104,7 +104,8 @@ impl Actors {
         }
     }
 
-    /// Leads all who go round nearer to the camera (1) or farther from it (0); the further below 0, the later they come by.
+    /// Leads all who go round nearer to the camera (up to 2) or farther from it (0); the further below 0, the later they
+    /// come by.
     pub fn set_closeness(&mut self, scene: &Scene, config: &WorldConfig, closeness: f64) {
         let walkers = self.people.iter_mut().enumerate().filter_map(|(k, person)| match &mut person.plan {
             Plan::Walk(way, _) => Some((k, way)),

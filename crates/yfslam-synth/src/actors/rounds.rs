@@ -10,8 +10,8 @@ use crate::rng::Rng;
 use crate::scene::Scene;
 
 const LANE_M: f64 = 0.5;
-/// Longest pause before the camera, s; three of a lane do not catch up with each other.
-const LINGER_S: f64 = 8.0;
+/// Pause before the camera at closeness 1, and at 2, s; three of a lane do not catch up with each other.
+const LINGER_S: [f64; 2] = [8.0, 14.0];
 
 /// Index of the person who carries a box: the first one, whose inner lane has room at its side.
 pub fn carrier(config: &WorldConfig) -> Option<usize> {
@@ -31,10 +31,11 @@ fn lane_of(k: usize) -> usize {
     (k + 1) % 2
 }
 
-/// The round of number `k` of those who go round: lingers the longer in front of the camera, and the shorter out of its
-/// sight, the closer; from a closeness of one half on, the near side comes nearer to the camera, too.
+/// The round of number `k` of those who go round, for a closeness up to 2: lingers the longer in front of the camera, and
+/// the shorter out of its sight, the closer; from one half to 1 the near side comes nearer to the camera; beyond 1 those who
+/// stand there move together and face the camera.
 pub fn round(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> Walkway {
-    let (late, closeness) = ((-closeness).max(0.0), closeness.max(0.0));
+    let (late, wall, closeness) = ((-closeness).max(0.0), (closeness - 1.0).clamp(0.0, 1.0), closeness.clamp(0.0, 1.0));
     let lane = lane_of(k);
     let inward = LANE_M * lane as f64;
     let [closest, farthest] = scene.walk_near_y;
@@ -61,27 +62,33 @@ pub fn round(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> W
     let mut draw = Rng::new(config.seed, 0x5c4e + lane as u64);
     let speed = draw.range64(0.75, 1.0);
     let handling = if carrier(config).is_some_and(|person| lane_of(person) == lane) { HANDLING_S } else { 0.0 };
+    // Towards the camera, from the direction of the way on the near side.
+    let facing = if lane == 0 { 1.4 } else { -1.4 };
     let mut stop = |x: f64, y: f64, linger: f64, least: f64| Stop {
-        near: [cx + x + draw.range64(-0.2, 0.2), y],
-        pause: (draw.range64(0.5, 1.0) + linger * draw.range64(0.8, 1.2)).max(least),
-        glance: draw.range64(-1.2, 1.2),
+        near: [cx + x + draw.range64(-0.2, 0.2) * (1.0 - 0.7 * wall), y],
+        pause: (draw.range64(0.5, 1.0) + linger * draw.range64(0.9, 1.1)).max(least),
+        glance: draw.range64(-1.2, 1.2) * (1.0 - wall) + facing * wall,
     };
     // Shy people wait at the side, which the camera does not see.
     // At first only the inner lane lingers: from there, the camera sees people with their heads.
-    let bold = LINGER_S * if lane == 1 { 2.0 * closeness } else { 2.0 * closeness - 1.0 }.clamp(0.0, 1.0);
-    let shy = 10.0 * (1.0 - closeness).max(0.0);
+    let linger = LINGER_S[0] + (LINGER_S[1] - LINGER_S[0]) * wall;
+    let bold = linger * if lane == 1 { 2.0 * closeness } else { 2.0 * closeness - 1.0 }.clamp(0.0, 1.0);
+    let shy = 10.0 * (1.0 - closeness);
+    let apart = 0.35 - 0.13 * wall;
     let stops = [
-        stop(-0.35, near, bold, handling),
-        stop(0.35, near, bold, handling),
+        stop(-apart, near, bold, handling),
+        stop(apart, near, bold, handling),
         stop(0.0, far, 0.0, 0.0),
         stop(half, cy, shy, 0.0),
     ];
     let going = walkers(scene, config) + config.actors.robots;
     let in_lane = (0..going).filter(|&k| lane_of(k) == lane).count();
     let spread = (k / 2) as f64 / in_lane.max(1) as f64;
-    // Someone of each lane comes by early, however short the sequence is; the lanes take turns.
+    // Someone of each lane comes by early, however short the sequence is; the lanes take turns, unless they are to hide as
+    // much as they can.
     let seconds = config.frames as f64 / config.camera.fps;
-    let first_visit = seconds.min(12.0) * (late + 0.3 + 0.4 * lane as f64 + draw.range64(-0.1, 0.1));
+    let turn = 0.3 + 0.4 * lane as f64 + draw.range64(-0.1, 0.1);
+    let first_visit = seconds.min(12.0) * (late + turn + (0.5 - turn) * wall);
     Walkway::new(&waypoints, &stops, speed, lane == 0).meeting(first_visit, spread)
 }
 

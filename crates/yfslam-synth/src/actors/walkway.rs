@@ -125,7 +125,7 @@ impl Walkway {
         let (share, rate) = profile(walked);
         let arc = leg.start_arc + share * leg.length;
         let waited = (t - leg.start_time - leg.walk_time).clamp(0.0, leg.pause);
-        let glance = leg.glance * (std::f64::consts::PI * waited / leg.pause).sin().powi(2);
+        let glance = leg.glance * turned(waited, leg.pause);
         let (position, heading) = self.locate(arc);
         let distance = rounds * self.arc[self.arc.len() - 1] + arc;
         Step {
@@ -178,6 +178,12 @@ impl Walkway {
 
 /// Share of a leg's time spent on speeding up, and as much on slowing down.
 const RAMP: f64 = 0.2;
+
+/// Share of a glance after `waited` of `pause` seconds: one turns within a second, stays, and turns back.
+fn turned(waited: f64, pause: f64) -> f64 {
+    let t = (waited.min(pause - waited) / (pause / 2.0).min(1.0)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
 
 /// Share of the way and relative speed at share `t` of the time: speed rises as a smoothstep, stays, falls.
 fn profile(t: f64) -> (f64, f64) {
