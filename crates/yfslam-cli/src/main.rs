@@ -11,6 +11,7 @@ mod cpu;
 mod detector;
 mod draw;
 mod html;
+mod map;
 mod moments;
 mod output;
 mod overlay;

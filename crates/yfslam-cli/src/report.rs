@@ -7,7 +7,7 @@ use yfslam_io::Fault;
 use yfslam_io::sequence::AssociationReport;
 
 use crate::detector::ModelIdentity;
-use crate::pipeline::{DynamicTally, FrameTally, Outcome, Stages};
+use crate::pipeline::{DynamicTally, FrameTally, Outcome, PlaceTally, Stages};
 use crate::source::{Source, Truth};
 
 /// What a report is made of.
@@ -40,6 +40,8 @@ pub struct Report<'a> {
     /// What was left out when colour and depth images were paired.
     pub association: Option<Association>,
     pub dynamic: &'a DynamicTally,
+    /// Loops that were closed, and stretches over which the camera was lost.
+    pub places: &'a PlaceTally,
     pub map: MapSize,
     /// Wall time of each stage over all frames; `mapping` over keyframes. `detector` runs beside `features`, decoding beside all.
     pub times: &'a Stages,
@@ -103,6 +105,7 @@ impl<'a> Report<'a> {
             frames: &outcome.frames,
             association: source.association.as_ref().map(Association::from),
             dynamic: &outcome.dynamic,
+            places: &outcome.places,
             map: MapSize { keyframes: outcome.keyframes.len(), landmarks: outcome.landmarks.len() },
             times: &outcome.stages,
             wall_s: outcome.wall.as_secs_f64(),

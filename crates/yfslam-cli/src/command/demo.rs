@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::{Args, value_parser};
-use yfslam::Config;
 use yfslam::dynamic::Method;
+use yfslam::{Config, Slam};
 use yfslam_eval::{EvalOptions, Evaluation, ExpectedFrames, Table, TableStyle, improvement_percent};
 
 use crate::accuracy::{judge, to_eval};
@@ -114,7 +114,7 @@ fn contenders(args: &DemoArgs, source: &Source) -> Result<Vec<Contender>> {
     let contender = |method| {
         let mut config = Config::default();
         config.dynamic.method = method;
-        let pipeline = Pipeline::new(&config, &source.camera.camera, None)?;
+        let pipeline = Pipeline::new(Slam::new(config.clone(), &source.camera.camera, None)?, None);
         let moments = Moments::new(source.stamps_ns.len(), MOMENTS, config.dynamic.open_score);
         Ok(Contender { config, pipeline, moments })
     };

@@ -5,17 +5,18 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use yfslam::Config;
 use yfslam::dynamic::Method;
+use yfslam::{Config, Slam};
 use yfslam_eval::{EvalOptions, Evaluation, ExpectedFrames, TableStyle};
 
 use crate::accuracy::{MatchArgs, judge, to_eval};
 use crate::detector::{self, DetectorArgs, LoadedDetector};
 use crate::html;
+use crate::map::MapArgs;
 use crate::moments::Moments;
 use crate::output::OutputFolder;
 use crate::overlay::Overlay;
-use crate::pipeline::{Outcome, Pipeline, Stages};
+use crate::pipeline::{Outcome, Pipeline, PlaceTally, Stages};
 use crate::progress::Progress;
 use crate::report::{BoxSource, Report, Run};
 use crate::settings::SettingsArgs;
@@ -28,6 +29,8 @@ Examples:
   yfslam run rgbd_dataset_freiburg1_xyz --camera tum1 --method none
   yfslam run 'synth:walking_xyz?seed=7&frames=300' --out walk      no data needed
   yfslam run DIR --start 100 --end 400 --reverse --overlay --report
+  yfslam run DIR --save-map lab.map                    then, another day:
+  yfslam run OTHER --load-map lab.map --localise
   yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
 
 In the output folder:
@@ -55,6 +58,8 @@ pub struct RunArgs {
     settings: SettingsArgs,
     #[command(flatten)]
     detector: DetectorArgs,
+    #[command(flatten)]
+    map: MapArgs,
     /// Where results go [default: yfslam-out/NAME, the name of the sequence].
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: Option<PathBuf>,
@@ -95,8 +100,12 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
     let pictures = args.overlay.then(|| Overlay::prepare(out.path(), config.dynamic.open_score)).transpose()?;
     let mut moments = args.report.then(|| Moments::new(source.stamps_ns.len(), MOMENTS, config.dynamic.open_score));
-    let mut pipeline = Pipeline::new(&config, &source.camera.camera, detector)?;
+    args.map.check()?;
+    let (detector, detector_times) = detector.map(|d| (d.detector, d.times)).unzip();
+    let slam = args.map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
+    let mut pipeline = Pipeline::new(slam, detector_times);
     drive(&mut source, &mut pipeline, pictures.as_ref(), moments.as_mut(), terminal)?;
+    args.map.save(&mut pipeline)?;
     let outcome = pipeline.finish(&config)?;
 
     let evaluation = truth.as_ref().map(|truth| {
@@ -231,11 +240,24 @@ fn summary(report: &Report, source: &Source, outcome: &Outcome) -> Result<String
             frames.detector_failures
         )?;
     }
+    places_summary(&mut text, &outcome.places)?;
     write!(text, "map: {} keyframes, {} landmarks", report.map.keyframes, report.map.landmarks)?;
     if let Some(peak) = report.peak_memory_mb {
         write!(text, "; peak memory {peak:.0} MB")?;
     }
     Ok(text + "\n")
+}
+
+fn places_summary(text: &mut String, places: &PlaceTally) -> Result<()> {
+    if !places.loops.is_empty() {
+        let drifts: Vec<_> = places.loops.iter().map(|l| format!("{:.2} m", l.drift_m)).collect();
+        writeln!(text, "loops closed: {}, after a drift of {}", places.loops.len(), drifts.join(", "))?;
+    }
+    if let Some(longest) = places.lost.iter().map(|stretch| stretch.frames).max() {
+        let found = places.lost.iter().filter(|stretch| stretch.found_again).count();
+        writeln!(text, "lost {} times, found again {found} times; for {longest} frames at most", places.lost.len())?;
+    }
+    Ok(())
 }
 
 /// Prints the errors; that they cannot be computed is an error if they were asked for.

@@ -2,6 +2,7 @@
 //!
 //! In: a configuration, a camera, frames. Out: an [`Outcome`]. No truth comes in here.
 
+mod places;
 mod stages;
 mod tally;
 
@@ -11,14 +12,15 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, bail};
 use yfslam::geometry::Pose;
 use yfslam::tracking::TrackingState;
-use yfslam::{Camera, Config, RgbdFrame, Slam, Tracked};
+use yfslam::{Config, RgbdFrame, Slam, Tracked};
 use yfslam_io::StampedPose;
 use yfslam_io::time::format_stamp;
 use yfslam_io::write::PlyPoint;
 
 use crate::cpu;
-use crate::detector::{LoadedDetector, Took};
+use crate::detector::Took;
 use crate::source::Skip;
+pub use places::PlaceTally;
 pub use stages::{StageSummary, Stages};
 pub use tally::{DynamicTally, FrameTally};
 
@@ -29,6 +31,7 @@ pub struct Pipeline {
     pub stages: Stages,
     frames: FrameTally,
     dynamic: DynamicTally,
+    places: PlaceTally,
     live: Vec<StampedPose>,
     resets: usize,
     detector_times: Option<Receiver<Took>>,
@@ -45,12 +48,13 @@ pub struct Outcome {
     pub trajectory: Vec<StampedPose>,
     /// All tracked frames, as they were known at their time.
     pub live: Vec<StampedPose>,
-    /// The keyframes that are in the map at the end.
+    /// The keyframes of this run that are in the map at the end.
     pub keyframes: Vec<StampedPose>,
     /// The landmarks.
     pub landmarks: Vec<PlyPoint>,
     pub frames: FrameTally,
     pub dynamic: DynamicTally,
+    pub places: PlaceTally,
     pub stages: Stages,
     /// From the first frame to the last.
     pub wall: Duration,
@@ -59,23 +63,22 @@ pub struct Outcome {
 }
 
 impl Pipeline {
-    /// # Errors
-    /// The detector does not know a class that the configuration calls movable.
-    pub fn new(config: &Config, camera: &Camera, detector: Option<LoadedDetector>) -> Result<Self> {
-        let (detector, times) = detector.map(|d| (d.detector, d.times)).unzip();
-        Ok(Self {
-            slam: Slam::new(config.clone(), camera, detector)?,
+    /// A record of what `slam` will do; `detector_times` tell what its detector takes.
+    pub fn new(slam: Slam, detector_times: Option<Receiver<Took>>) -> Self {
+        Self {
+            slam,
             stages: Stages::default(),
             frames: FrameTally::default(),
             dynamic: DynamicTally::default(),
+            places: PlaceTally::default(),
             live: Vec::new(),
             resets: 0,
-            detector_times: times,
+            detector_times,
             cpu: cpu::thread_time().map(|_| Duration::ZERO),
             started: Instant::now(),
             state: TrackingState::default(),
             best_start: (0, 0),
-        })
+        }
     }
 
     /// Takes one frame through SLAM; one that it refuses is counted as skipped. Returns the state after it.
@@ -95,6 +98,7 @@ impl Pipeline {
         self.note_times(&tracked);
         self.frames.count(tracked.state);
         self.dynamic.count(&self.slam);
+        self.places.count(&tracked);
         if self.slam.resets() > self.resets {
             // A new map is a new world: poses of the old one do not belong to this trajectory.
             self.resets = self.slam.resets();
@@ -147,7 +151,10 @@ impl Pipeline {
         }
         self.stages.push("dynamic filter", times.dynamic);
         self.stages.push("tracking", times.tracking);
-        if tracked.is_keyframe {
+        if !times.places.is_zero() {
+            self.stages.push("places", times.places);
+        }
+        if !times.mapping.is_zero() {
             self.stages.push("mapping", times.mapping);
         }
     }
@@ -162,18 +169,37 @@ impl Pipeline {
         self.best_start = self.best_start.max((features.len(), with_depth));
     }
 
+    /// The map as bytes, for a later run.
+    ///
+    /// # Errors
+    /// It cannot be written, which would be a fault of this program.
+    pub fn save_map(&mut self) -> Result<Vec<u8>> {
+        self.settle();
+        Ok(self.slam.save_map()?)
+    }
+
+    /// Waits for mapping that is under way.
+    fn settle(&mut self) {
+        if let (Some(closed), Some(last)) = (self.slam.settle(), self.live.last()) {
+            self.places.close(last.timestamp_ns, &closed);
+        }
+    }
+
     /// Ends the run.
     ///
     /// # Errors
     /// No frame was tracked; the message says why.
     pub fn finish(mut self, config: &Config) -> Result<Outcome> {
+        self.settle();
+        self.places.keyframes_passed_over = self.slam.passed_over();
         let wall = self.started.elapsed();
         self.frames.detector_failures = self.slam.detector_failures();
         if self.frames.tracked == 0 {
             self.fail(config)?;
         }
         let map = self.slam.map();
-        let mut keyframes: Vec<_> = map.keyframes().map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
+        let of_this_run = map.keyframes().filter(|(_, k)| k.sequence >= self.slam.first_keyframe());
+        let mut keyframes: Vec<_> = of_this_run.map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
         keyframes.sort_by_key(|&(sequence, ..)| sequence);
         let landmark =
             |l: &yfslam::map::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
@@ -184,6 +210,7 @@ impl Pipeline {
             landmarks: map.landmarks().map(|(_, l)| landmark(l)).collect(),
             frames: self.frames,
             dynamic: self.dynamic,
+            places: self.places,
             stages: self.stages,
             wall,
             cpu: self.cpu,

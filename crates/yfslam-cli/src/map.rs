@@ -1,0 +1,75 @@
+//! Maps that last: where a run's map comes from and where it goes, and on which thread it is made.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use yfslam::map::persist::{SavedMap, decode};
+use yfslam::{Execution, MapUse, Slam};
+use yfslam_io::write_atomically;
+
+use crate::pipeline::Pipeline;
+
+/// What a run does with maps.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Map")]
+pub struct MapArgs {
+    /// Begin in the map of an earlier run: it is extended once a place is recognised.
+    #[arg(long, value_name = "FILE")]
+    pub load_map: Option<PathBuf>,
+    /// Leave the loaded map as it is, and find the camera in it.
+    #[arg(long, requires = "load_map", conflicts_with = "save_map")]
+    pub localise: bool,
+    /// Write the map, for --load-map. The file is written whole or not at all.
+    #[arg(long, value_name = "FILE")]
+    pub save_map: Option<PathBuf>,
+    /// Map on a thread of its own, as for a live camera: tracking never waits. Results then differ from run to run.
+    #[arg(long)]
+    pub threaded: bool,
+}
+
+impl MapArgs {
+    /// A system that maps as was asked for.
+    ///
+    /// # Errors
+    /// The map cannot be read, is none, or was made with other settings or, to be extended, with another camera.
+    pub fn apply(&self, slam: Slam) -> Result<Slam> {
+        let execution = if self.threaded { Execution::Threaded } else { Execution::Inline };
+        let slam = slam.with_execution(execution)?;
+        let Some(path) = &self.load_map else { return Ok(slam) };
+        let map_use = if self.localise { MapUse::Localise } else { MapUse::Extend };
+        slam.with_map(read(path)?, map_use).with_context(|| format!("the map {} does not fit", path.display()))
+    }
+
+    /// Proves before a long run that the map can be written after it.
+    ///
+    /// # Errors
+    /// It cannot.
+    pub fn check(&self) -> Result<()> {
+        let Some(path) = &self.save_map else { return Ok(()) };
+        // A new file of another name: what stands at `path` stays until there is a map to take its place.
+        let mut probe = path.clone().into_os_string();
+        probe.push(".probe");
+        let probe = PathBuf::from(probe);
+        write_atomically(&probe, |_| Ok(()))
+            .with_context(|| format!("the map {} cannot be written", path.display()))?;
+        // Left behind it does no harm.
+        let _ = std::fs::remove_file(probe);
+        Ok(())
+    }
+
+    /// Writes the map if that was asked for.
+    ///
+    /// # Errors
+    /// The file cannot be written; what stood there stays.
+    pub fn save(&self, pipeline: &mut Pipeline) -> Result<()> {
+        let Some(path) = &self.save_map else { return Ok(()) };
+        let map = pipeline.save_map()?;
+        Ok(write_atomically(path, |file| file.write_all(&map))?)
+    }
+}
+
+fn read(path: &Path) -> Result<SavedMap> {
+    let bytes = std::fs::read(path).with_context(|| format!("the map {} cannot be read", path.display()))?;
+    decode(&bytes).with_context(|| format!("{} cannot be used as a map", path.display()))
+}
