@@ -52,7 +52,7 @@ pub fn build(seed: u64) -> Scene {
         walk_far_y: 0.45,
         walk_near_y: [-1.25, -0.90],
         round: ROUND.to_vec(),
-        seats: vec![crate_seat(-1.55, 0.35, -2.5), crate_seat(1.75, 0.30, 2.6)],
+        seats: vec![crate_seat(-1.52, 0.88, -2.5), crate_seat(1.72, 0.86, 2.6)],
         stands: vec![stand(-0.6, 0.3, 2.9), stand(0.7, 0.25, -2.9), stand(-2.2, 0.0, -2.2), stand(2.5, -0.2, 2.2)],
     }
 }
@@ -154,8 +154,8 @@ fn is_free(place: [f32; 2], margin: f32) -> bool {
 fn stores(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     let wood = Material::Planks([0.62, 0.47, 0.30]);
     for (x, y, z, size, yaw) in [
-        (-1.55, 0.55, 0.0, 0.46, 0.4),
-        (1.75, 0.50, 0.0, 0.46, -0.3),
+        (-1.55, 1.00, 0.0, 0.46, 0.4),
+        (1.75, 0.98, 0.0, 0.46, -0.3),
         (-3.3, 0.35, 0.0, 0.75, 0.2),
         (-3.25, 0.40, 0.75, 0.55, 0.5),
         (3.4, 0.55, 0.0, 0.70, -0.25),
@@ -173,7 +173,7 @@ fn stores(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     b.density = 330.0;
     let rings = [[0.88, 0.0], [0.88, 0.29], [0.0, 0.29]];
     for (x, y, color) in [
-        (2.55, 0.95, [0.20, 0.34, 0.46]),
+        (2.65, 1.15, [0.20, 0.34, 0.46]),
         (-2.2, 1.45, [0.52, 0.22, 0.16]),
         (6.4, -0.2, [0.24, 0.40, 0.30]),
         (6.3, 0.5, [0.52, 0.22, 0.16]),
