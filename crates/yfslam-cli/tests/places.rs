@@ -16,9 +16,9 @@ use yfslam_io::write_atomically;
 const DESK: &str = "synth:sitting_xyz?people=0&width=320&height=240&frames=90";
 
 #[test]
-fn a_camera_that_was_covered_is_found_again_within_ten_frames() {
+fn a_camera_that_was_blinded_is_found_again_within_ten_frames() {
     let folder = tempfile::tempdir().unwrap();
-    let output = succeeds(folder.path(), &["run", DESK, "--fault", "covered@1+1", "--out", "out"]);
+    let output = succeeds(folder.path(), &["run", DESK, "--fault", "black@1+1", "--out", "out"]);
     assert!(output.stdout.contains("lost 1 times, found again 1 times"), "{}", output.stdout);
     let report = report(&folder.path().join("out"));
     let lost = &report["places"]["lost"][0];

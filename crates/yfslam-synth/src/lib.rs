@@ -6,6 +6,32 @@
 //!                camera path ───────────────────┘
 //! ```
 //!
+//! # Scenes
+//!
+//! | `scene=` | size | what is in it |
+//! |---|---|---|
+//! | `office` | 6.4 m × 6 m × 2.7 m | the desk of the TUM freiburg3 sequences: monitors, books, posters, chairs |
+//! | `rescue` | 14 m × 12 m × 4.4 m | a damaged hall: rubble, pillars, crates, barrels, bare concrete, few lamps |
+//! | `corridor` | 45.6 m around a block, 2.4 m wide | doors, notice boards, signs, radiators, plants; alike, but no two places the same |
+//! | `lab` | 6 m × 5.4 m × 2.8 m | white walls with hardly any texture: sockets, cable duct, bench, floor seams |
+//!
+//! # Motions of the camera
+//!
+//! The first four have the lengths and times of the TUM RGB-D benchmark's sequences (Sturm et al., "A benchmark for the
+//! evaluation of RGB-D SLAM systems", IROS 2012, and its web page).
+//!
+//! | `motion=` | way | pace |
+//! |---|---|---|
+//! | `static` | hand shake only | 0.28 m in 24.8 s (`walking_static`) |
+//! | `xyz` | ±0.38 m sideways, ±0.24 m up and down, ±0.30 m forwards | 5.79 m in 28.8 s (`walking_xyz`) |
+//! | `rpy` | ±24° roll, ±17° pitch, ±23° yaw | 2.70 m in 30.6 s, 21°/s (`walking_rpy`) |
+//! | `halfsphere` | on a sphere of 0.55 m radius, looking at its centre | 7.69 m in 35.8 s (`walking_halfsphere`) |
+//! | `drive` | along the scene's round, 0.85 m above the floor, as on a wheeled robot | 0.7 m/s, at most 34°/s |
+//! | `loop` | once around the round and 6 % past its start, carried at 1.35 m | 0.4 to 1.2 m/s, at most 40°/s |
+//!
+//! Light can change: `flicker=` makes about half of the lamps wander in brightness and drop out, `exposure=` darkens the
+//! whole picture.
+//!
 //! ```
 //! # fn main() -> Result<(), yfslam_synth::WorldError> {
 //! let mut config = yfslam_synth::parse("synth:walking_xyz?seed=7&people=1&width=64&height=48&frames=10")?;

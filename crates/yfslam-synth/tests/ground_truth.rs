@@ -3,7 +3,7 @@
 
 use nalgebra::Point3;
 use yfslam::Camera;
-use yfslam_synth::{SensorConfig, SynthFrame, World, WorldConfig, parse};
+use yfslam_synth::{CameraMotion, SceneKind, SensorConfig, SynthFrame, World, WorldConfig, parse};
 
 /// A small, noise-free world without baked shadows (they cost most of the set-up time).
 fn config(spec: &str) -> WorldConfig {
@@ -110,6 +110,113 @@ fn exact_depth_agrees_through_a_distorting_lens_too() {
     // The lens of freiburg1: strong, with all five coefficients.
     config.camera.distortion = [0.2624, -0.9531, -0.0054, 0.0026, 1.1633];
     static_pixels_agree(&config);
+}
+
+/// What the empty `scene` shows at three moments of every motion.
+fn views_of(scene: &str) -> Vec<(WorldConfig, Vec<SynthFrame>)> {
+    let shoot = |(motion, _): &(&str, CameraMotion)| {
+        let config = config(&format!("sitting_xyz?seed=3&people=0&frames=1300&scene={scene}&motion={motion}"));
+        let world = World::new(&config).unwrap();
+        let shots = [310, 318, 345].into_iter().map(|i| world.frame(i)).collect();
+        (config, shots)
+    };
+    CameraMotion::ALL.iter().map(shoot).collect()
+}
+
+#[test]
+fn exact_depth_agrees_between_frames_in_every_scene_and_motion() {
+    for (scene, _) in SceneKind::ALL {
+        for (config, shots) in views_of(scene) {
+            for (a, b) in [(0, 1), (1, 0), (0, 2), (2, 1)] {
+                let (agree, hidden, through) = compare(&config.camera, &shots[a], &shots[b]);
+                let what = format!("{scene} {:?}, shots {a} and {b}: {agree}, {hidden}, {through}", config.motion);
+                assert!(agree > 8_000, "too few compared: {what}");
+                assert!(hidden < agree / 5, "too many hidden: {what}");
+                // A rod thinner than a pixel may be seen in one frame and missed in the other.
+                assert!(through * 1000 <= agree, "seen through: {what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pose_that_is_wrong_by_three_millimetres_would_be_noticed() {
+    let config = config("walking_xyz?seed=4&people=0");
+    let world = World::new(&config).unwrap();
+    let (a, mut b) = (world.frame(0), world.frame(40));
+    b.t_world_cam.translation.y += 0.003;
+    let (agree, _, through) = compare(&config.camera, &a, &b);
+    assert!(through > agree, "{agree} agree, {through} do not");
+}
+
+#[test]
+fn every_scene_is_closed_and_the_camera_keeps_clear_of_everything_on_its_way() {
+    for (scene, _) in SceneKind::ALL {
+        for motion in ["drive", "loop", "xyz", "halfsphere"] {
+            let spec = format!("sitting_xyz?people=0&frames=1300&scene={scene}&motion={motion}&width=64&height=48");
+            let mut config = parse(&spec).unwrap();
+            config.light.shadow_rays = 0;
+            let world = World::new(&config).unwrap();
+            for index in (0..1300).step_by(26) {
+                let shot = world.frame(index);
+                let nearest = shot.exact_depth.data().iter().copied().fold(f32::INFINITY, f32::min);
+                assert!(nearest > 0.25, "{scene} {motion}, frame {index}: {nearest} m");
+                assert!(shot.exact_depth.data().iter().all(|z| z.is_finite()));
+            }
+        }
+    }
+}
+
+/// First frame after which a tour passes its first pose again, its distance and angle from it, and the way until then.
+fn lap(world: &World) -> (usize, f64, f64, f64) {
+    let first = world.pose(0);
+    let away = |i: usize| first.inverse() * world.pose(i);
+    let left = (1..).find(|&i| away(i).translation.vector.norm() > 1.0).unwrap();
+    let back = (left..left + 4000).find(|&i| {
+        let [here, next] = [away(i), away(i + 1)].map(|t| t.translation.vector.norm());
+        here < 0.2 && next > here
+    });
+    let back = back.unwrap();
+    let step = |i: usize| (world.pose(i).translation.vector - world.pose(i + 1).translation.vector).norm();
+    (back, away(back).translation.vector.norm(), away(back).rotation.angle(), (0..back).map(step).sum())
+}
+
+#[test]
+fn a_loop_passes_its_start_again_looking_the_same_way() {
+    for (scene, _) in SceneKind::ALL {
+        for motion in ["loop", "drive"] {
+            let world = world(&format!("sitting_xyz?people=0&frames=1300&shake=0&scene={scene}&motion={motion}"));
+            let (frames, distance, angle, way) = lap(&world);
+            let what = format!("{scene} {motion}: {way:.1} m in {frames} frames");
+            assert!(distance < 0.03 && angle < 0.03, "{what}: {distance} m and {angle} rad off");
+        }
+    }
+}
+
+#[test]
+fn the_corridor_is_over_forty_metres_around_and_fits_into_1300_frames() {
+    let (frames, _, _, way) = lap(&world("sitting_xyz?people=0&frames=1300&scene=corridor&motion=loop&shake=0"));
+    assert!(way > 40.0, "{way} m");
+    assert!((1150..1270).contains(&frames), "{frames} frames");
+    let rushed = lap(&world("sitting_xyz?people=0&frames=300&scene=corridor&motion=loop&shake=0"));
+    assert!(rushed.0 > 1000, "{} frames for {way} m are too few", rushed.0);
+}
+
+#[test]
+fn flickering_light_changes_the_picture_and_nothing_else() {
+    let bright = |shot: &SynthFrame| {
+        shot.frame.color.data().iter().map(|p| f64::from(p[1])).sum::<f64>() / shot.frame.color.data().len() as f64
+    };
+    let steady = world("walking_static?seed=5&people=1&scene=rescue");
+    let changing = world("walking_static?seed=5&people=1&scene=rescue&flicker=0.8");
+    let mut ratios = Vec::new();
+    for index in (0..300).step_by(30) {
+        let (a, b) = (steady.frame(index), changing.frame(index));
+        assert!(a.exact_depth == b.exact_depth && a.instances == b.instances && a.boxes == b.boxes);
+        ratios.push(bright(&b) / bright(&a));
+    }
+    let (low, high) = ratios.iter().fold((f64::INFINITY, 0.0f64), |(l, h), &r| (l.min(r), h.max(r)));
+    assert!(low > 0.4 && high < 1.2 && high - low > 0.05, "{ratios:?}");
 }
 
 #[test]

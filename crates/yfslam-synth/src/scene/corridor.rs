@@ -87,7 +87,7 @@ fn floor_and_ceiling(b: &mut Builder) -> Vec<Lamp> {
         b.rectangle(Vec3::new(x[0], y[0], HEIGHT), dx, dy, Material::Ceiling);
         let half = if along_x { [0.6, 0.14] } else { [0.14, 0.6] };
         let middle = Vec3::new((x[0] + x[1]) / 2.0, (y[0] + y[1]) / 2.0, HEIGHT - 0.03);
-        let steady = lamps.len() % 2 == 0;
+        let steady = lamps.len().is_multiple_of(2);
         lamps.push(b.lamp(middle, [Vec3::x() * half[0], Vec3::y() * half[1]], 1.3, [2.3, 2.25, 2.1], steady));
     };
     let (long, short) = (2.0 * (mx + HALF) / 6.0, 2.0 * (my - HALF) / 3.0);
@@ -114,7 +114,7 @@ fn inner_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
     for bay in 0..count {
         let s = start + bay as f32 * pitch;
         b.density = 350.0;
-        wall.hang(b, [s + 0.25, 2.06], [0.98, 2.06], Material::Door([0.60, 0.46, 0.32]));
+        wall.door(b, s + 0.25, [0.98, 2.06], [0.60, 0.46, 0.32]);
         let paper = s + 1.45;
         match (bay + corridor) % 4 {
             0 => {
@@ -147,6 +147,7 @@ fn inner_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
 /// The outside: windows above radiators in the north and east, boards and lockers in the south and west.
 fn outer_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
     let pitch = 2.5;
+    corner_prints(b, wall, corridor);
     // The corners hold landmarks.
     let count = ((wall.length - 3.2) / pitch) as usize;
     let start = (wall.length - count as f32 * pitch) / 2.0;
@@ -183,12 +184,40 @@ fn outer_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
             }
             _ => {
                 b.density = 350.0;
-                wall.hang(b, [s + 0.7, 2.06], [0.98, 2.06], Material::Door([0.42, 0.48, 0.55]));
+                wall.door(b, s + 0.7, [0.98, 2.06], [0.42, 0.48, 0.55]);
                 b.density = 600.0;
                 wall.hang(b, [s + 1.9, 1.9], [0.42, 0.6], Material::Poster);
             }
         }
     }
+}
+
+/// Plans, boards and signs on the pieces of wall at both ends: who comes around a corner sees little else.
+fn corner_prints(b: &mut Builder, wall: &Wall, corridor: usize) {
+    let end = wall.length;
+    b.density = 420.0;
+    let prints = [
+        (0.25, 2.15, 0.84, 0.6, Material::Poster),
+        (1.22, 2.05, 0.35, 0.5, Material::Poster),
+        (
+            end - 1.75,
+            2.1,
+            1.05,
+            0.75,
+            if corridor.is_multiple_of(2) { Material::NoticeBoard } else { Material::Poster },
+        ),
+        (end - 0.6, 1.95, 0.35, 0.5, Material::Poster),
+        (end - 0.55, 0.85, 0.297, 0.42, Material::Paper),
+        (1.3, 0.80, 0.297, 0.21, Material::Paper),
+    ];
+    for (s, z, w, h, material) in prints {
+        let jitter = b.rng.range(-0.06, 0.06);
+        wall.hang(b, [s + jitter, z + jitter], [w, h], material);
+    }
+    b.density = 600.0;
+    wall.hang(b, [end - 1.45, 2.45], [0.50, 0.22], Material::Sign([0.10, 0.46, 0.28]));
+    wall.hang(b, [1.25, 0.35], [0.16, 0.08], Material::Socket);
+    wall.hang(b, [end - 1.3, 0.35], [0.16, 0.08], Material::Socket);
 }
 
 fn extinguisher(b: &mut Builder, wall: &Wall, s: f32) {

@@ -27,13 +27,15 @@ pub fn build(seed: u64) -> Scene {
     pillars(&mut b);
     fallen(&mut b);
     for (x, y, radius, height, count) in [
-        (0.2, 2.3, 1.7, 1.0, 90),
-        (-2.6, 2.6, 0.9, 0.5, 28),
-        (2.9, 1.6, 0.9, 0.6, 30),
-        (-6.1, 0.5, 1.0, 0.8, 26),
-        (6.1, 2.0, 1.0, 0.7, 24),
-        (0.8, 7.4, 1.4, 0.7, 28),
-        (-5.8, 6.6, 1.3, 0.9, 26),
+        (0.2, 2.5, 1.9, 0.9, 170),
+        (-2.5, 2.6, 1.0, 0.5, 45),
+        (2.9, 1.5, 1.1, 0.5, 50),
+        (-6.0, 0.5, 1.2, 0.6, 60),
+        (6.1, 2.6, 1.2, 0.6, 50),
+        (1.6, 7.4, 1.3, 0.5, 50),
+        (-5.6, 6.8, 1.5, 0.7, 70),
+        (5.9, -2.0, 0.9, 0.4, 30),
+        (-2.4, -3.6, 1.2, 0.4, 36),
     ] {
         heap(&mut b, [x, y], radius, height, count);
     }
@@ -50,7 +52,7 @@ pub fn build(seed: u64) -> Scene {
         walk_far_y: 0.45,
         walk_near_y: [-1.25, -0.90],
         round: ROUND.to_vec(),
-        seats: vec![crate_seat(-1.55, 0.35, -2.5), crate_seat(1.75, 0.30, 2.6)],
+        seats: vec![crate_seat(-1.52, 0.88, -2.5), crate_seat(1.72, 0.86, 2.6)],
         stands: vec![stand(-0.6, 0.3, 2.9), stand(0.7, 0.25, -2.9), stand(-2.2, 0.0, -2.2), stand(2.5, -0.2, 2.2)],
     }
 }
@@ -124,7 +126,8 @@ fn heap(b: &mut Builder, [x, y]: [f32; 2], radius: f32, height: f32, count: usiz
         if !is_free(at, 0.45 + 0.5 * size.max()) {
             continue;
         }
-        let z = height * (1.0 - far) * b.rng.range(0.2, 1.0);
+        // Later pieces lie on earlier ones.
+        let z = height * (1.0 - far).min(0.6) * (k as f32 / count as f32) + 0.08;
         let turn =
             UnitQuaternion::from_euler_angles(b.rng.range(-0.7, 0.7), b.rng.range(-0.7, 0.7), b.rng.range(-3.1, 3.1));
         let shade = b.rng.range(0.75, 1.1);
@@ -151,8 +154,8 @@ fn is_free(place: [f32; 2], margin: f32) -> bool {
 fn stores(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     let wood = Material::Planks([0.62, 0.47, 0.30]);
     for (x, y, z, size, yaw) in [
-        (-1.55, 0.55, 0.0, 0.46, 0.4),
-        (1.75, 0.50, 0.0, 0.46, -0.3),
+        (-1.55, 1.00, 0.0, 0.46, 0.4),
+        (1.75, 0.98, 0.0, 0.46, -0.3),
         (-3.3, 0.35, 0.0, 0.75, 0.2),
         (-3.25, 0.40, 0.75, 0.55, 0.5),
         (3.4, 0.55, 0.0, 0.70, -0.25),
@@ -170,7 +173,7 @@ fn stores(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     b.density = 330.0;
     let rings = [[0.88, 0.0], [0.88, 0.29], [0.0, 0.29]];
     for (x, y, color) in [
-        (2.55, 0.95, [0.20, 0.34, 0.46]),
+        (2.65, 1.15, [0.20, 0.34, 0.46]),
         (-2.2, 1.45, [0.52, 0.22, 0.16]),
         (6.4, -0.2, [0.24, 0.40, 0.30]),
         (6.3, 0.5, [0.52, 0.22, 0.16]),
@@ -186,7 +189,7 @@ fn stores(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
         wall.hang(b, [s, z], [0.9, 0.45], Material::Sign(color));
     }
     b.density = 260.0;
-    north.hang(b, [6.3, 2.5], [2.2, 2.5], Material::Door([0.40, 0.44, 0.46]));
+    north.door(b, 6.3, [2.2, 2.5], [0.40, 0.44, 0.46]);
     south.hang(b, [3.0, 2.5], [2.2, 2.5], Material::Ribs([0.46, 0.48, 0.47]));
     for (wall, s) in [(west, 2.0), (west, 8.5), (east, 3.0), (north, 1.5), (north, 12.0)] {
         wall.mount(b, [s, 0.4], Vec3::new(0.9, 0.22, 1.3), |_| Material::Rusty([0.40, 0.44, 0.42]));

@@ -4,6 +4,7 @@
 
 use super::builder::{Builder, Side};
 use crate::mesh::Vec3;
+use crate::texture::Color;
 use crate::texture::material::Material;
 
 /// A wall as one sees it who faces it.
@@ -81,5 +82,14 @@ impl Wall {
     pub fn mount(&self, b: &mut Builder, [s, z]: [f32; 2], size: Vec3, material: impl Fn(Side) -> Material) {
         let base = self.at(s, z, 0.5 * size.y + 0.5 * PROUD_M);
         b.cuboid(base, size, self.yaw(), material);
+    }
+
+    /// A door in its frame, proud of the skirting: left edge at `s`.
+    pub fn door(&self, b: &mut Builder, s: f32, [width, height]: [f32; 2], color: Color) {
+        let place = [s + width / 2.0, 0.0];
+        self.mount(b, place, Vec3::new(width, 0.05, height), |side| match side {
+            Side::Front => Material::Door(color),
+            _ => Material::Plain([0.62, 0.63, 0.64]),
+        });
     }
 }
