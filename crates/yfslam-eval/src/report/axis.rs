@@ -119,11 +119,11 @@ fn trimmed(length: &str) -> String {
     format!("{number} {unit}")
 }
 
-/// The 1, 2 or 5 times a power of ten that is next to `rough` or above.
+/// The 1, 2 or 5 times a power of ten that is near `rough`.
 fn nice_step(rough: f64) -> f64 {
     let rough = if rough.is_finite() && rough > 0.0 { rough } else { 1.0 };
     let power = 10f64.powf(rough.log10().floor());
-    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= rough * 0.999).unwrap_or(10.0);
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= rough * 0.7).unwrap_or(10.0);
     factor * power
 }
 

@@ -127,7 +127,7 @@ fn accuracy(report: &Report, scene: &Scene) -> Markup {
                 "Absolute trajectory error (ATE) after alignment by rotation and translation; relative pose error (RPE) without. \
                  Improvement is (1 − error / error of the first) · 100 %. S.D.: standard deviation."
             }
-            div.pair {
+            div.pair.accuracy {
                 (tables::errors(report))
                 @if let Some(bars) = bars(report, scene) { (figure(scene, &bars, false)) }
             }
