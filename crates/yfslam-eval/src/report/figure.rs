@@ -15,7 +15,7 @@ const FINE: f64 = 10.0;
 /// Points that one line may have in the figure: more than there are pixel columns.
 const MOST_POINTS: usize = 2500;
 /// Space for labels and names of the axes, px.
-const LEFT: f64 = 58.0;
+const LEFT: f64 = 70.0;
 const BELOW: f64 = 46.0;
 const MARGIN: f64 = 12.0;
 /// Size of labels, px.

@@ -34,7 +34,7 @@ fn table(report: &Report, rows: &[Row], with_tracked: bool) -> Markup {
                         tr.groups {
                             th {}
                             th colspan=(report.methods.len()) {}
-                            th.improve colspan=(others.len()) { "improvement on " (first.name) " (%)" }
+                            th.improve colspan=(others.len()) { "improvement (%) on " (first.name) }
                         }
                     }
                     tr {
