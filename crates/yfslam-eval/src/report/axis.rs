@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn even_axes_have_round_labels_inside_the_range() {
         assert_eq!(labels(&Axis::linear("", [-0.3, 1.1], 4, 1.0)), ["0.0", "0.5", "1.0"]);
-        assert_eq!(labels(&Axis::linear("", [0.0, 0.0213], 4, 1e3)), ["0", "10", "20"]);
+        assert_eq!(labels(&Axis::linear("", [0.0, 0.0213], 4, 1e3)), ["0", "5", "10", "15", "20"]);
         assert_eq!(labels(&Axis::linear("", [-20.0, 20.0], 4, 1.0)), ["−20", "−10", "0", "10", "20"]);
         assert!(Axis::linear("", [0.0, 0.0], 4, 1.0).ticks.len() < 20);
     }

@@ -164,8 +164,8 @@ impl Figure {
             (self.x.range[0] + x / plot[0] / px_per_unit[0], self.y.range[0] + y / plot[1] / px_per_unit[1])
         };
         let line: Vec<Point> = points.iter().map(|&p| px(p)).collect();
-        let parts = clip(&line, [0.0, 0.0], plot);
-        parts.iter().map(|part| thin(part, MOST_POINTS).into_iter().map(back).collect()).collect()
+        let parts = thin(&clip(&line, [0.0, 0.0], plot), MOST_POINTS);
+        parts.into_iter().filter(|part| !part.is_empty()).map(|part| part.into_iter().map(back).collect()).collect()
     }
 }
 

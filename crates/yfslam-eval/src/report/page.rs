@@ -71,7 +71,7 @@ fn verdict(report: &Report) -> Markup {
         b { (method.name) } " tracks " b { (percent(method.frames.tracked_percent())) } " of the frames"
         @if let Some(ate) = ate { " with an error (ATE, RMSE) of " b { (length(ate)) } }
         @if let Some((by, name)) = better {
-            @if by >= 0.0 { ", " (format!("{by:.1}")) " % less than " (name) } @else { ", " (format!("{:.1}", -by)) " % more than " (name) }
+            @if by >= 0.0 { ", " (format!("{by:.2}")) " % less than " (name) } @else { ", " (format!("{:.2}", -by)) " % more than " (name) }
         }
         @if report.truth.is_none() { "; how far off is not known, for there is no ground truth" }
         "."
