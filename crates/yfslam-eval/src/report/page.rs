@@ -165,6 +165,10 @@ fn errors(report: &Report, scene: &Scene) -> Markup {
                 "Distance between the aligned estimate and the ground truth, and angles between them about the camera's viewing direction \
                  (roll), its right (pitch) and its down (yaw). Angles are those that are left when the orientations are aligned: positions \
                  along a line would not tell how the camera is turned about it."
+                @if let Some(angle) = scene.mount.angle_deg() {
+                    " The ground truth follows a frame that is turned by " (format!("{angle:.1}")) "° against the camera's; this constant turn \
+                     is taken out here; the RPE in the table still has it."
+                }
                 @if scene.any_lost() { " Shaded: no pose." }
             }
             div.pair { @for one in &figures { (figure(scene, one, false)) } }
