@@ -124,8 +124,9 @@ fn accuracy(report: &Report, scene: &Scene) -> Markup {
                 p.none { "The trajectory of " (method.name) " cannot be compared with the ground truth: too short, or too straight to be aligned." }
             }
             p.about {
-                "Absolute trajectory error (ATE) after alignment by rotation and translation; relative pose error (RPE) without. \
-                 Improvement is (1 − error / error of the first) · 100 %. S.D.: standard deviation."
+                "Absolute trajectory error (ATE) after alignment by rotation and translation; relative pose error (RPE) without. S.D.: \
+                 standard deviation."
+                @if report.methods.len() > 1 { " Improvement is (1 − error / error of the first) · 100 %." }
             }
             div.pair.accuracy {
                 (tables::errors(report))

@@ -30,7 +30,7 @@ fn clip_segment(a: Point, b: Point, low: Point, high: Point) -> Option<[Point; 2
                 enter = enter.max(room / speed);
             } else if speed > 0.0 {
                 leave = leave.min(room / speed);
-            } else if !(room >= 0.0) {
+            } else if room < 0.0 || room.is_nan() {
                 return None;
             }
         }

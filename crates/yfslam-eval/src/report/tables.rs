@@ -6,11 +6,14 @@ use super::ink::Ink;
 use super::{MethodReport, Report, Stage};
 use crate::{Delta, Evaluation, Rpe, Statistics, improvement_percent};
 
+/// Finds a figure among the errors of a method.
+type Find = Box<dyn Fn(&Evaluation) -> Option<f64>>;
+
 /// A row of the table of errors: its name, the name of the figure in `run.json`, and where it is found.
 struct Row {
     name: String,
     key: String,
-    of: Box<dyn Fn(&Evaluation) -> Option<f64>>,
+    of: Find,
 }
 
 /// Errors and improvement (paper Tables 2 to 4, equation 3); a single method leaves room for absolute and relative errors side by side.
