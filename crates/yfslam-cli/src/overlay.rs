@@ -19,6 +19,9 @@ const BOX: Color = [255, 220, 0];
 /// A box that keeps a track alive but would open none.
 const WEAK_BOX: Color = [140, 120, 0];
 
+/// The colours of all that is drawn.
+pub const MARKS: [Color; 5] = [STATIC, UNMATCHED, DYNAMIC, BOX, WEAK_BOX];
+
 /// Writes one picture a frame.
 pub struct Overlay {
     folder: PathBuf,

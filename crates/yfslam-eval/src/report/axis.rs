@@ -54,13 +54,18 @@ impl Axis {
         Self { name: name.into(), scale: Scale::Linear, range: [from, to], ticks }
     }
 
-    /// A logarithmic axis of lengths in metres over whole decades that hold `from` to `to`.
+    /// A logarithmic axis of lengths in metres; labels are powers of ten, or also their double and fivefold where that would be few.
     pub fn log_lengths(name: impl Into<String>, [from, to]: [f64; 2]) -> Self {
-        let exponent = |value: f64| value.max(1e-9).log10();
-        let low = exponent(from).floor();
-        let high = exponent(to).ceil().max(low + 1.0);
-        let decades = (high - low) as i32;
-        let ticks = (0..=decades).map(|k| low + f64::from(k)).map(|e| (e, trimmed(&length(10f64.powf(e))))).collect();
+        let low = from.max(1e-9).log10();
+        let high = to.max(1e-9).log10().max(low + 1.0);
+        let ticks_of = |factors: &[f64]| -> Vec<(f64, String)> {
+            let decades = low.floor() as i32..=high.ceil() as i32;
+            let values = decades.flat_map(|exponent| factors.iter().map(move |f| f * 10f64.powi(exponent)));
+            let ticks = values.map(|value| (value.log10(), trimmed(&length(value))));
+            ticks.filter(|(at, _)| (low..=high).contains(at)).collect()
+        };
+        let decades = ticks_of(&[1.0]);
+        let ticks = if decades.len() < 3 { ticks_of(&[1.0, 2.0, 5.0]) } else { decades };
         Self { name: name.into(), scale: Scale::Log, range: [low, high], ticks }
     }
 
@@ -119,11 +124,11 @@ fn trimmed(length: &str) -> String {
     format!("{number} {unit}")
 }
 
-/// The 1, 2 or 5 times a power of ten that is next to `rough` or above.
+/// The 1, 2 or 5 times a power of ten that is near `rough`.
 fn nice_step(rough: f64) -> f64 {
     let rough = if rough.is_finite() && rough > 0.0 { rough } else { 1.0 };
     let power = 10f64.powf(rough.log10().floor());
-    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= rough * 0.999).unwrap_or(10.0);
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= rough * 0.7).unwrap_or(10.0);
     factor * power
 }
 
@@ -138,14 +143,15 @@ mod tests {
     #[test]
     fn even_axes_have_round_labels_inside_the_range() {
         assert_eq!(labels(&Axis::linear("", [-0.3, 1.1], 4, 1.0)), ["0.0", "0.5", "1.0"]);
-        assert_eq!(labels(&Axis::linear("", [0.0, 0.0213], 4, 1e3)), ["0", "10", "20"]);
+        assert_eq!(labels(&Axis::linear("", [0.0, 0.0213], 4, 1e3)), ["0", "5", "10", "15", "20"]);
         assert_eq!(labels(&Axis::linear("", [-20.0, 20.0], 4, 1.0)), ["−20", "−10", "0", "10", "20"]);
         assert!(Axis::linear("", [0.0, 0.0], 4, 1.0).ticks.len() < 20);
     }
 
     #[test]
     fn logarithmic_axes_name_lengths_in_their_own_unit() {
-        assert_eq!(labels(&Axis::log_lengths("", [0.0013, 0.8])), ["1 mm", "1 cm", "10 cm", "1 m"]);
+        assert_eq!(labels(&Axis::log_lengths("", [0.0009, 1.3])), ["1 mm", "1 cm", "10 cm", "1 m"]);
+        assert_eq!(labels(&Axis::log_lengths("", [0.003, 0.06])), ["5 mm", "1 cm", "2 cm", "5 cm"]);
         assert_eq!(length(0.0156), "1.56 cm");
         assert_eq!(length(0.041), "4.10 cm");
         assert_eq!(length(0.999_6), "1.00 m");

@@ -23,7 +23,7 @@ pub fn bars(report: &Report, scene: &Scene) -> Option<Captioned> {
     let [smallest, largest] = bounds(methods.iter().flat_map(|(_, s)| [s.rmse, s.std]))?;
     let is_log = smallest > 0.0 && largest / smallest > LOG_FROM_RATIO;
     let y = if is_log {
-        Axis::log_lengths("ATE, logarithmic; bars in m", [smallest / 2.0, largest * 1.3])
+        Axis::log_lengths("ATE, logarithmic", [smallest * 0.4, largest * 1.6])
     } else {
         Axis::linear("ATE (m)", [0.0, largest.max(1e-6) * 1.15], 4, 1.0)
     };

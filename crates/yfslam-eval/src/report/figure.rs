@@ -15,7 +15,7 @@ const FINE: f64 = 10.0;
 /// Points that one line may have in the figure: more than there are pixel columns.
 const MOST_POINTS: usize = 2500;
 /// Space for labels and names of the axes, px.
-const LEFT: f64 = 58.0;
+const LEFT: f64 = 70.0;
 const BELOW: f64 = 46.0;
 const MARGIN: f64 = 12.0;
 /// Size of labels, px.
@@ -164,8 +164,8 @@ impl Figure {
             (self.x.range[0] + x / plot[0] / px_per_unit[0], self.y.range[0] + y / plot[1] / px_per_unit[1])
         };
         let line: Vec<Point> = points.iter().map(|&p| px(p)).collect();
-        let parts = clip(&line, [0.0, 0.0], plot);
-        parts.iter().map(|part| thin(part, MOST_POINTS).into_iter().map(back).collect()).collect()
+        let parts = thin(&clip(&line, [0.0, 0.0], plot), MOST_POINTS);
+        parts.into_iter().filter(|part| !part.is_empty()).map(|part| part.into_iter().map(back).collect()).collect()
     }
 }
 

@@ -15,6 +15,7 @@ mod axis;
 mod bars;
 mod figure;
 mod ink;
+mod orientation;
 mod over_time;
 mod page;
 mod path;

@@ -24,7 +24,7 @@ fn translation(scene: &Scene) -> Option<Captioned> {
     let best = rms.iter().copied().fold(f64::INFINITY, f64::min);
     let is_log = rms.iter().any(|rms| rms / best > LOG_FROM_RATIO);
     let axis = if is_log {
-        Axis::log_lengths("error, logarithmic", [best / 5.0, worst])
+        Axis::log_lengths("error, logarithmic", [best / 5.0, worst * 1.1])
     } else {
         let (unit, per_m) = length_unit(worst);
         Axis::linear(format!("error ({unit})"), [0.0, worst.max(1e-6) * 1.05], 4, per_m)

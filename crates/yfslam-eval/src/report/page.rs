@@ -71,7 +71,7 @@ fn verdict(report: &Report) -> Markup {
         b { (method.name) } " tracks " b { (percent(method.frames.tracked_percent())) } " of the frames"
         @if let Some(ate) = ate { " with an error (ATE, RMSE) of " b { (length(ate)) } }
         @if let Some((by, name)) = better {
-            @if by >= 0.0 { ", " (format!("{by:.1}")) " % less than " (name) } @else { ", " (format!("{:.1}", -by)) " % more than " (name) }
+            @if by >= 0.0 { ", " (format!("{by:.2}")) " % less than " (name) } @else { ", " (format!("{:.2}", -by)) " % more than " (name) }
         }
         @if report.truth.is_none() { "; how far off is not known, for there is no ground truth" }
         "."
@@ -124,10 +124,11 @@ fn accuracy(report: &Report, scene: &Scene) -> Markup {
                 p.none { "The trajectory of " (method.name) " cannot be compared with the ground truth: too short, or too straight to be aligned." }
             }
             p.about {
-                "Absolute trajectory error (ATE) after alignment by rotation and translation; relative pose error (RPE) without. \
-                 Improvement is (1 − error / error of the first) · 100 %. S.D.: standard deviation."
+                "Absolute trajectory error (ATE) after alignment by rotation and translation; relative pose error (RPE) without. S.D.: \
+                 standard deviation."
+                @if report.methods.len() > 1 { " Improvement is (1 − error / error of the first) · 100 %." }
             }
-            div.pair {
+            div.pair.accuracy {
                 (tables::errors(report))
                 @if let Some(bars) = bars(report, scene) { (figure(scene, &bars, false)) }
             }
@@ -165,6 +166,10 @@ fn errors(report: &Report, scene: &Scene) -> Markup {
                 "Distance between the aligned estimate and the ground truth, and angles between them about the camera's viewing direction \
                  (roll), its right (pitch) and its down (yaw). Angles are those that are left when the orientations are aligned: positions \
                  along a line would not tell how the camera is turned about it."
+                @if let Some(angle) = scene.mount.angle_deg() {
+                    " The ground truth follows a frame that is turned by " (format!("{angle:.1}")) "° against the camera's; this constant turn \
+                     is taken out here; the RPE in the table still has it."
+                }
                 @if scene.any_lost() { " Shaded: no pose." }
             }
             div.pair { @for one in &figures { (figure(scene, one, false)) } }

@@ -30,7 +30,7 @@ fn clip_segment(a: Point, b: Point, low: Point, high: Point) -> Option<[Point; 2
                 enter = enter.max(room / speed);
             } else if speed > 0.0 {
                 leave = leave.min(room / speed);
-            } else if !(room >= 0.0) {
+            } else if room < 0.0 || room.is_nan() {
                 return None;
             }
         }
@@ -42,15 +42,16 @@ fn clip_segment(a: Point, b: Point, low: Point, high: Point) -> Option<[Point; 2
     (enter <= leave).then_some([from, to])
 }
 
-/// Leaves out points nearer to the last one kept than a tolerance in px, which starts at 0.3 and grows until `most` points are enough.
+/// Leaves out points nearer to the last one kept than a tolerance in px, which starts at 0.3 and grows until `most` points are enough
+/// for all parts of a line together.
 ///
-/// No point of the line is farther than the tolerance from those that are left; both ends stay.
-pub fn thin(line: &[Point], most: usize) -> Vec<Point> {
+/// No point of the line is farther than the tolerance from those that are left; the ends of a part stay, unless all of it is that small.
+pub fn thin(parts: &[Vec<Point>], most: usize) -> Vec<Vec<Point>> {
     let mut tolerance = 0.3;
     loop {
-        let kept = keep_apart(line, tolerance);
-        // Two points always suffice in the end, because the tolerance outgrows any figure.
-        if kept.len() <= most.max(2) || tolerance > 1e6 {
+        let kept: Vec<Vec<Point>> = parts.iter().map(|part| keep_apart(part, tolerance)).collect();
+        // In the end nothing is left, because the tolerance outgrows any figure.
+        if kept.iter().map(Vec::len).sum::<usize>() <= most {
             return kept;
         }
         tolerance *= 1.5;
@@ -58,14 +59,17 @@ pub fn thin(line: &[Point], most: usize) -> Vec<Point> {
 }
 
 fn keep_apart(line: &[Point], tolerance: f64) -> Vec<Point> {
+    let near = |a: &Point, b: &Point| (a[0] - b[0]).hypot(a[1] - b[1]) <= tolerance;
     let mut kept: Vec<Point> = Vec::new();
     for (index, &point) in line.iter().enumerate() {
-        let near = kept.last().is_some_and(|last| (point[0] - last[0]).hypot(point[1] - last[1]) <= tolerance);
-        if !near || index + 1 == line.len() {
+        if index + 1 == line.len() || !kept.last().is_some_and(|last| near(last, &point)) {
             kept.push(point);
         }
     }
-    kept
+    match kept.as_slice() {
+        [from, to] if near(from, to) => Vec::new(),
+        _ => kept,
+    }
 }
 
 #[cfg(test)]
@@ -86,8 +90,11 @@ mod tests {
     fn a_line_of_any_length_keeps_its_peaks_in_few_points() {
         let mut line: Vec<Point> = (0..100_000).map(|i| [f64::from(i) * 0.005, f64::from(i % 2) * 0.1]).collect();
         line[40_000][1] = 90.0;
-        let kept = thin(&line, 2000);
+        let [kept] = &thin(&[line.clone()], 2000)[..] else { panic!("one part stays one") };
         assert!(kept.len() <= 2000, "{}", kept.len());
         assert!(kept.contains(&line[40_000]) && kept.contains(&line[99_999]));
+        // The same in parts of two points each.
+        let parts: Vec<Vec<Point>> = line.chunks(2).map(<[Point]>::to_vec).collect();
+        assert!(thin(&parts, 2000).iter().flatten().count() <= 2000);
     }
 }

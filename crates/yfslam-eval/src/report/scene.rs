@@ -2,6 +2,7 @@
 
 use super::Report;
 use super::ink::Ink;
+use super::orientation::Mount;
 use super::series::{At, Clock, Series};
 
 /// Width of every figure, px: two stand side by side on a wide page, and one fits a phone.
@@ -12,6 +13,8 @@ pub const LOG_FROM_RATIO: f64 = 20.0;
 /// What all figures are made of.
 pub struct Scene<'a> {
     pub clock: Clock,
+    /// How the frame that the truth follows is turned against the camera's.
+    pub mount: Mount,
     pub truth: Option<Vec<At>>,
     pub methods: Vec<Drawn<'a>>,
 }
@@ -34,13 +37,14 @@ impl<'a> Scene<'a> {
     /// Prepares what there is to draw.
     pub fn new(report: &'a Report) -> Self {
         let clock = Clock::new(report);
+        let mount = Mount::of(report);
         let drawn = |(place, method): (usize, &'a super::MethodReport)| Drawn {
             name: method.name,
             ink: Ink::method(method.name, place),
-            series: Series::new(report, method, &clock),
+            series: Series::new(report, method, &clock, &mount),
         };
         let methods = report.methods.iter().enumerate().map(drawn).collect();
-        Self { truth: report.truth.map(|truth| clock.truth(truth)), methods, clock }
+        Self { truth: report.truth.map(|truth| clock.truth(truth, &mount)), methods, mount, clock }
     }
 
     /// Whether any method has a stretch without a pose.

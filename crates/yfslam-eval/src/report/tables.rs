@@ -6,15 +6,27 @@ use super::ink::Ink;
 use super::{MethodReport, Report, Stage};
 use crate::{Delta, Evaluation, Rpe, Statistics, improvement_percent};
 
+/// Finds a figure among the errors of a method.
+type Find = Box<dyn Fn(&Evaluation) -> Option<f64>>;
+
 /// A row of the table of errors: its name, the name of the figure in `run.json`, and where it is found.
 struct Row {
     name: String,
     key: String,
-    of: Box<dyn Fn(&Evaluation) -> Option<f64>>,
+    of: Find,
 }
 
-/// Errors and improvement (paper Tables 2 to 4, equation 3).
+/// Errors and improvement (paper Tables 2 to 4, equation 3); a single method leaves room for absolute and relative errors side by side.
 pub fn errors(report: &Report) -> Markup {
+    let rows = rows(report);
+    let absolute = rows.iter().filter(|row| row.key.starts_with("ate")).count();
+    match (report.methods.as_slice(), rows.split_at(absolute)) {
+        ([_], (absolute, relative)) => html! { (table(report, absolute, true)) (table(report, relative, false)) },
+        _ => table(report, &rows, true),
+    }
+}
+
+fn table(report: &Report, rows: &[Row], with_tracked: bool) -> Markup {
     let others = report.methods.get(1..).unwrap_or_default();
     let baseline = report.methods.first();
     html! {
@@ -25,7 +37,7 @@ pub fn errors(report: &Report) -> Markup {
                         tr.groups {
                             th {}
                             th colspan=(report.methods.len()) {}
-                            th.improve colspan=(others.len()) { "improvement on " (first.name) }
+                            th.improve colspan=(others.len()) { "improvement (%) on " (first.name) }
                         }
                     }
                     tr {
@@ -35,7 +47,7 @@ pub fn errors(report: &Report) -> Markup {
                     }
                 }
                 tbody {
-                    @for row in rows(report) {
+                    @for row in rows {
                         tr {
                             th { (row.name) }
                             @for method in &report.methods {
@@ -43,10 +55,11 @@ pub fn errors(report: &Report) -> Markup {
                                     (method.evaluation.and_then(&row.of).map_or("–".to_owned(), |v| format!("{v:.4}")))
                                 }
                             }
-                            @for method in others { (improvement(baseline, method, &row)) }
+                            @for method in others { (improvement(baseline, method, row)) }
                         }
                     }
-                    tr {
+                    @if with_tracked {
+                      tr {
                         th { "Frames tracked (%)" }
                         @for method in &report.methods {
                             td data-key=(format!("{}.tracked_percent", method.name)) {
@@ -54,6 +67,7 @@ pub fn errors(report: &Report) -> Markup {
                             }
                         }
                         @for _ in others { td {} }
+                      }
                     }
                 }
             }
@@ -74,7 +88,7 @@ fn improvement(baseline: Option<&MethodReport>, method: &MethodReport, row: &Row
     };
     html! {
         td.improve.worse[percent.is_some_and(|p| p < 0.0)] {
-            (percent.map_or("–".to_owned(), |p| format!("{p:.2} %").replace('-', "−")))
+            (percent.map_or("–".to_owned(), |p| format!("{p:.2}").replace('-', "−")))
         }
     }
 }
