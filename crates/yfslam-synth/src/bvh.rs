@@ -31,7 +31,7 @@ impl Bvh {
         let mut corners: Vec<[Vec3; 3]> = mesh
             .triangles
             .iter()
-            .filter(|t| !matches!(mesh.patches[t.patch as usize].lighting, Lighting::Emissive(_)))
+            .filter(|t| !matches!(mesh.patches[t.patch as usize].lighting, Lighting::Emissive(_) | Lighting::Lamp(_)))
             .map(|t| t.vertices.map(|i| mesh.vertices[i as usize].position))
             .collect();
         let mut bvh = Self { nodes: Vec::new(), triangles: Vec::new() };

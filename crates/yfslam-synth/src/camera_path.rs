@@ -1,4 +1,5 @@
-//! Camera paths after the TUM freiburg3 sequences: key poses joined by minimum-jerk moves, plus hand shake.
+//! Camera paths: key poses joined by minimum-jerk moves after the TUM freiburg3 sequences, or a round through the place;
+//! plus hand shake.
 //!
 //! In: motion, seed and time. Out: the camera's pose in the world. Moves follow s(τ) = 10τ³ − 15τ⁴ + 6τ⁵ (Flash and Hogan,
 //! "The coordination of arm movements", 1985), so that velocity and acceleration are continuous everywhere; each lasts
@@ -6,8 +7,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use crate::config::CameraMotion;
+use crate::config::{CameraMotion, WorldConfig};
 use crate::rng::Rng;
+use crate::scene::Scene;
+use crate::tour::{Pace, Tour};
 
 /// Mean speed of walking_xyz: 5.79 m in 28.8 s.
 const XYZ_SPEED: f64 = 5.79 / 28.8;
@@ -23,6 +26,17 @@ const RPY_LEVER: f64 = 0.353;
 const SHAKE_M: f64 = 0.000_935;
 const SHAKE_RAD: f64 = 0.0008;
 
+/// A wheeled robot: slow, low, and rattled a little by its wheels.
+const DRIVE: Pace = Pace { speed: [0.7, 0.7], turn: 0.6, height: 0.85, tilt: 0.05, rounding: 0.6 };
+/// A person who carries the camera around.
+const WALK: Pace = Pace { speed: [0.4, 1.2], turn: 0.698, height: 1.35, tilt: 0.10, rounding: 0.9 };
+/// How far a loop is walked past its start, relative.
+const LOOP_OVERLAP: f64 = 0.06;
+/// Frequencies (Hz) of hand shake and their weights: slow sway, wrist, and a trace of tremor.
+const HAND: [(f64, f64); 3] = [(0.35, 2.2), (1.3, 1.0), (4.1, 0.18)];
+/// The same for a robot: body and wheels.
+const WHEELS: [(f64, f64); 3] = [(0.8, 0.6), (3.1, 0.3), (6.3, 0.15)];
+
 /// Coordinates of a key pose: what they mean depends on the motion.
 type Key = Vector3<f64>;
 
@@ -31,6 +45,8 @@ type Key = Vector3<f64>;
 pub struct CameraPath {
     motion: CameraMotion,
     base: Isometry3<f64>,
+    /// The round, for the motions that leave the place.
+    tour: Option<Tour>,
     /// Start times of the moves, s; move k leads from key k to key k + 1 (the last back to key 0).
     starts: Vec<f64>,
     keys: Vec<Key>,
@@ -49,11 +65,19 @@ pub fn look_at(eye: Point3<f64>, target: Point3<f64>) -> Isometry3<f64> {
 }
 
 impl CameraPath {
-    /// A path around the pose `base` (world from camera).
-    pub fn new(motion: CameraMotion, base: Isometry3<f64>, hand_shake: f64, seed: u64) -> Self {
-        let mut rng = Rng::new(seed, 0xca);
+    /// The path of `config` in `scene`.
+    pub fn new(config: &WorldConfig, scene: &Scene) -> Self {
+        let motion = config.motion;
+        let mut rng = Rng::new(config.seed, 0xca);
         let keys = keys(motion, &mut rng);
-        let mut path = Self { motion, base, starts: Vec::new(), keys, period: 0.0, shake: shake(hand_shake, &mut rng) };
+        let seconds = config.frames as f64 / config.camera.fps;
+        let (tour, sines) = match motion {
+            CameraMotion::Drive => (Some(Tour::new(&scene.round, DRIVE, seconds)), WHEELS),
+            CameraMotion::Loop => (Some(Tour::new(&scene.round, WALK, seconds / (1.0 + LOOP_OVERLAP))), HAND),
+            _ => (None, HAND),
+        };
+        let shake = shake(config.hand_shake, sines, &mut rng);
+        let mut path = Self { motion, base: scene.camera, tour, starts: Vec::new(), keys, period: 0.0, shake };
         for k in 0..path.keys.len() {
             path.starts.push(path.period);
             path.period += path.duration(k);
@@ -67,7 +91,10 @@ impl CameraPath {
             sines.iter().map(|[amplitude, omega, phase]| amplitude * (omega * time + phase).sin()).sum::<f64>()
         });
         let shake = Isometry3::new(Vector3::new(x, y, z), Vector3::new(pitch, yaw, roll));
-        self.base * self.local(&self.coordinates(time)) * shake
+        match &self.tour {
+            Some(tour) => tour.pose(time) * shake,
+            None => self.base * self.local(&self.coordinates(time)) * shake,
+        }
     }
 
     fn coordinates(&self, time: f64) -> Key {
@@ -88,7 +115,7 @@ impl CameraPath {
     /// Camera pose relative to the base for the given coordinates; camera axes are right, down, forward.
     fn local(&self, c: &Key) -> Isometry3<f64> {
         match self.motion {
-            CameraMotion::Static => Isometry3::identity(),
+            CameraMotion::Static | CameraMotion::Drive | CameraMotion::Loop => Isometry3::identity(),
             CameraMotion::Xyz => Isometry3::translation(c.x, c.y, c.z),
             CameraMotion::Rpy => {
                 let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), c.z)
@@ -115,7 +142,7 @@ impl CameraPath {
         };
         let length = sum(&|a, b| (a.translation.vector - b.translation.vector).norm());
         match self.motion {
-            CameraMotion::Static => 0.0,
+            CameraMotion::Static | CameraMotion::Drive | CameraMotion::Loop => 0.0,
             CameraMotion::Xyz => length / XYZ_SPEED,
             CameraMotion::Rpy => sum(&|a, b| a.rotation.angle_to(&b.rotation)) / RPY_RATE,
             CameraMotion::Halfsphere => length / HALFSPHERE_SPEED,
@@ -138,7 +165,7 @@ fn keys(motion: CameraMotion, rng: &mut Rng) -> Vec<Key> {
     for _ in 0..3 {
         let mut near = |x: f64| x * rng.range64(0.85, 1.15);
         match motion {
-            CameraMotion::Static => {}
+            CameraMotion::Static | CameraMotion::Drive | CameraMotion::Loop => {}
             CameraMotion::Xyz => {
                 // Two strokes along each axis: right and left, down and up, forward and back.
                 for (axis, reach) in [(0, 0.38), (1, 0.24), (2, 0.30)] {
@@ -174,11 +201,11 @@ fn keys(motion: CameraMotion, rng: &mut Rng) -> Vec<Key> {
     keys
 }
 
-fn shake(strength: f64, rng: &mut Rng) -> [[[f64; 3]; 3]; 6] {
+fn shake(strength: f64, sines: [(f64, f64); 3], rng: &mut Rng) -> [[[f64; 3]; 3]; 6] {
     std::array::from_fn(|axis| {
         let amplitude = strength * if axis < 3 { SHAKE_M } else { SHAKE_RAD };
-        // Slow sway, wrist, and a trace of tremor; incommensurate by their random part.
-        [(0.35, 2.2), (1.3, 1.0), (4.1, 0.18)].map(|(hertz, weight)| {
+        // Incommensurate by their random part.
+        sines.map(|(hertz, weight)| {
             // A faster sine is smaller, so that the path length does not depend on the draw.
             let detune = rng.range64(0.85, 1.15);
             let omega = std::f64::consts::TAU * hertz * detune;
@@ -192,7 +219,8 @@ mod tests {
     use super::*;
 
     fn path(motion: CameraMotion, seed: u64) -> CameraPath {
-        CameraPath::new(motion, look_at(Point3::new(0.0, -1.7, 1.35), Point3::new(0.0, 1.2, 0.9)), 1.0, seed)
+        let config = WorldConfig { motion, seed, ..WorldConfig::default() };
+        CameraPath::new(&config, &Scene::new(config.scene, seed))
     }
 
     fn length(path: &CameraPath, seconds: f64) -> f64 {

@@ -15,12 +15,23 @@ pub enum CameraMotion {
     Rpy,
     /// On a half sphere, looking at its centre: 7.69 m in 35.8 s.
     Halfsphere,
+    /// On a wheeled robot, forwards along the scene's round at up to 0.7 m/s, with a little vibration.
+    Drive,
+    /// Carried once around the scene's round and 6 % past its start, as fast as the number of frames asks for but between
+    /// 0.4 and 1.2 m/s and at most 40°/s: the whole corridor takes 1250 frames at 30 Hz, fewer show a part of it.
+    Loop,
 }
 
 impl CameraMotion {
     /// All motions with their names in specs.
-    pub const ALL: [(&str, Self); 4] =
-        [("static", Self::Static), ("xyz", Self::Xyz), ("rpy", Self::Rpy), ("halfsphere", Self::Halfsphere)];
+    pub const ALL: [(&str, Self); 6] = [
+        ("static", Self::Static),
+        ("xyz", Self::Xyz),
+        ("rpy", Self::Rpy),
+        ("halfsphere", Self::Halfsphere),
+        ("drive", Self::Drive),
+        ("loop", Self::Loop),
+    ];
 }
 
 /// What the people do.
@@ -45,6 +56,18 @@ pub enum SceneKind {
     /// An office of 6.4 m × 6 m with a desk in the middle.
     #[default]
     Office,
+    /// A damaged hall of 14 m × 12 m: rubble, pillars, crates and barrels, little texture, few lamps.
+    Rescue,
+    /// Four corridors around a block, 45.6 m along the middle: doors, signs, notice boards, radiators and plants.
+    Corridor,
+    /// An empty laboratory of 6 m × 5.4 m with white walls: sockets, a cable duct, a whiteboard and floor seams.
+    Lab,
+}
+
+impl SceneKind {
+    /// All scenes with their names in specs.
+    pub const ALL: [(&str, Self); 4] =
+        [("office", Self::Office), ("rescue", Self::Rescue), ("corridor", Self::Corridor), ("lab", Self::Lab)];
 }
 
 /// A synthetic sequence.
@@ -128,13 +151,16 @@ pub struct LightConfig {
     pub shadow_rays: usize,
     /// Whether moving people darken the floor and furniture around them.
     pub moving_shadows: bool,
-    /// Brightness of the picture; 1 suits the office.
+    /// Brightness of the picture; 1 suits every scene, 0.2 is dark.
     pub exposure: f32,
+    /// How much the lamps that are not steady change: slowly all the time and at times suddenly; 0 not at all, 1 down to
+    /// darkness. In the office all but the window, in the others half of the lamps.
+    pub flicker: f32,
 }
 
 impl Default for LightConfig {
     fn default() -> Self {
-        Self { shadow_rays: 8, moving_shadows: true, exposure: 1.0 }
+        Self { shadow_rays: 8, moving_shadows: true, exposure: 1.0, flicker: 0.0 }
     }
 }
 
@@ -267,6 +293,7 @@ impl WorldConfig {
         let light = &self.light;
         check(light.shadow_rays <= 1024, "light.shadow_rays", light.shadow_rays, "at most 1024")?;
         check((0.0..=100.0).contains(&light.exposure), "light.exposure", light.exposure, "between 0 and 100")?;
+        check((0.0..=1.0).contains(&light.flicker), "light.flicker", light.flicker, "between 0 and 1")?;
         let s = &self.sensor;
         for (name, value) in [
             ("sensor.color_noise", s.color_noise),

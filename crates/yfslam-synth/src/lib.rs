@@ -18,9 +18,11 @@
 //! # }
 //! ```
 
+mod bake;
 mod bvh;
 mod camera_path;
 mod config;
+mod flicker;
 mod light;
 mod mesh;
 mod people;
@@ -30,7 +32,9 @@ mod scene;
 mod sensor;
 mod spec;
 mod suite;
+mod surfaces;
 mod texture;
+mod tour;
 mod world;
 
 pub use config::{

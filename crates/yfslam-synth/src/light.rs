@@ -1,13 +1,10 @@
-//! Light: soft light maps for everything that stands still, cheap light and contact shadows for what moves.
+//! Light: area lamps with shadows for what stands still, cheap light and contact shadows for what moves.
 //!
-//! In: the static mesh and the lamps. Out: irradiance (linear RGB) per light-map texel, baked with shadow rays; the same
-//! lamps evaluated without shadow rays for moving vertices; and the darkening that moving bodies cast around them
-//! (ambient occlusion of a sphere, Quílez, "Sphere ambient occlusion", 2006).
+//! In: the lamps and a point. Out: its irradiance (linear RGB), with shadow rays for the light maps and without them for
+//! moving vertices; and the darkening that moving bodies cast around them (ambient occlusion of a sphere, Quílez,
+//! "Sphere ambient occlusion", 2006).
 
-use rayon::prelude::*;
-
-use crate::bvh::Bvh;
-use crate::mesh::{Lighting, Mesh, Vec3};
+use crate::mesh::Vec3;
 
 /// A rectangular lamp (or window) that shines from its front.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +17,8 @@ pub struct Lamp {
     pub normal: Vec3,
     /// Radiant power per area and direction, linear RGB.
     pub radiance: [f32; 3],
+    /// Whether its brightness never changes; the others flicker together.
+    pub steady: bool,
 }
 
 /// All light sources of a scene.
@@ -31,15 +30,6 @@ pub struct Lights {
     pub ambient: [[f32; 3]; 2],
 }
 
-/// Irradiance over a patch's [0, 1]².
-#[derive(Clone, Debug)]
-pub struct LightMap {
-    width: usize,
-    height: usize,
-    /// Linear RGB; the fourth lane is unused.
-    values: Vec<[f32; 4]>,
-}
-
 /// A sphere of a moving body that shades its surroundings.
 #[derive(Clone, Copy, Debug)]
 pub struct Occluder {
@@ -49,22 +39,34 @@ pub struct Occluder {
     pub radius: f32,
 }
 
-/// Distance between light-map samples on large surfaces, m.
-const SPACING_M: f32 = 0.11;
 /// Beyond this distance a hit does not dim ambient light any more, m.
 const AMBIENT_REACH_M: f32 = 1.5;
 /// Share of ambient light that still comes from a surface nearby.
 const BOUNCED: f32 = 0.35;
 /// Keeps light finite at the lamp itself, m².
 const SOFTENING_M2: f32 = 0.05;
+/// What a lamp adds less than this (irradiance) is left out: it could not change a grey level.
+const NEGLIGIBLE: f32 = 0.002;
 /// Lifts ray origins off their own surface, m.
 const OFFSET_M: f32 = 2e-3;
 
+impl Lamp {
+    fn area(&self) -> f32 {
+        4.0 * self.half[0].norm() * self.half[1].norm()
+    }
+
+    /// Whether the lamp could add anything that shows at `point`.
+    fn matters_at(&self, point: &Vec3) -> bool {
+        let strongest = self.radiance.iter().copied().fold(0.0, f32::max);
+        strongest * self.area() > NEGLIGIBLE * (self.center - point).norm_squared()
+    }
+}
+
 impl Lights {
-    /// Irradiance at a point. `hidden(origin, direction, distance)` tells whether something is in the way; `samples`
-    /// is the number of rays per lamp and twice as many for the ambient term. All points use the same sample pattern:
-    /// what error remains is smooth over a surface instead of mottled.
-    fn irradiance(
+    /// Irradiance at a point, and in the fourth lane the share of it that flickers. `hidden(origin, direction, distance)`
+    /// tells whether something is in the way; `samples` is the number of rays per lamp and twice as many for the ambient
+    /// term. All points use the same sample pattern: what error remains is smooth over a surface instead of mottled.
+    pub fn irradiance(
         &self,
         point: &Vec3,
         normal: &Vec3,
@@ -72,16 +74,18 @@ impl Lights {
         hidden: &impl Fn(&Vec3, &Vec3, f32) -> bool,
     ) -> [f32; 4] {
         let origin = point + normal * OFFSET_M;
-        let mut sum = [0.0; 4];
-        for lamp in &self.lamps {
-            let area = 4.0 * lamp.half[0].norm() * lamp.half[1].norm();
-            for [a, b] in (0..samples).map(scattered) {
+        // Steady and flickering light.
+        let mut sums = [[0.0; 3]; 2];
+        for lamp in self.lamps.iter().filter(|lamp| lamp.matters_at(&origin)) {
+            let sum = &mut sums[usize::from(!lamp.steady)];
+            for [a, b] in (0..samples.max(1)).map(scattered) {
                 let to = lamp.center + lamp.half[0] * (2.0 * a - 1.0) + lamp.half[1] * (2.0 * b - 1.0) - origin;
                 let distance = to.norm();
                 let direction = to / distance;
                 let (facing, leaving) = (normal.dot(&direction), -lamp.normal.dot(&direction));
-                if facing > 0.0 && leaving > 0.0 && !hidden(&origin, &direction, distance - 0.02) {
-                    let gain = facing * leaving * area / (distance * distance + SOFTENING_M2) / samples as f32;
+                if facing > 0.0 && leaving > 0.0 && (samples == 0 || !hidden(&origin, &direction, distance - 0.02)) {
+                    let gain =
+                        facing * leaving * lamp.area() / (distance * distance + SOFTENING_M2) / samples.max(1) as f32;
                     (0..3).for_each(|k| sum[k] += lamp.radiance[k] * gain);
                 }
             }
@@ -91,9 +95,34 @@ impl Lights {
             .map(scattered)
             .map(|[s, t]| if hidden(&origin, &hemisphere(normal, s, t), AMBIENT_REACH_M) { BOUNCED } else { 1.0 });
         let open = if rays == 0 { 1.0 } else { open.sum::<f32>() / rays as f32 };
-        let ambient = self.ambient_light(normal);
-        (0..3).for_each(|k| sum[k] += open * ambient[k]);
-        sum
+        let (ambient, unsteady) = (self.ambient_light(normal), self.unsteady_share());
+        for k in 0..3 {
+            sums[0][k] += open * ambient[k] * (1.0 - unsteady);
+            sums[1][k] += open * ambient[k] * unsteady;
+        }
+        let total: [f32; 3] = std::array::from_fn(|k| sums[0][k] + sums[1][k]);
+        let flickering = sums[1].iter().sum::<f32>() / total.iter().sum::<f32>().max(1e-6);
+        [total[0], total[1], total[2], flickering]
+    }
+
+    /// Share of all power that comes from flickering lamps; light that bounces around has this share, too.
+    fn unsteady_share(&self) -> f32 {
+        let power = |lamp: &Lamp| lamp.area() * lamp.radiance.iter().sum::<f32>();
+        let all: f32 = self.lamps.iter().map(power).sum();
+        let unsteady: f32 = self.lamps.iter().filter(|lamp| !lamp.steady).map(power).sum();
+        if all > 0.0 { unsteady / all } else { 0.0 }
+    }
+
+    /// The same lamps while those that flicker are at `brightness`.
+    pub fn dimmed(&self, brightness: f32) -> Self {
+        let share = self.unsteady_share();
+        let mut dimmed = self.clone();
+        for lamp in dimmed.lamps.iter_mut().filter(|lamp| !lamp.steady) {
+            lamp.radiance = lamp.radiance.map(|c| c * brightness);
+        }
+        let bounced = 1.0 + share * (brightness - 1.0);
+        dimmed.ambient = dimmed.ambient.map(|side| side.map(|c| c * bounced));
+        dimmed
     }
 
     /// Light from all around, by how far up a surface looks.
@@ -102,78 +131,20 @@ impl Lights {
         std::array::from_fn(|k| self.ambient[0][k] * up + self.ambient[1][k] * (1.0 - up))
     }
 
-    /// Bakes the light maps of every patch of `mesh` and makes the patches use them.
-    pub fn bake(&self, mesh: &mut Mesh, samples: usize) -> Vec<LightMap> {
-        let bvh = Bvh::new(mesh);
-        let first = first_triangles(mesh);
-        let maps: Vec<Option<LightMap>> = (0..mesh.patches.len())
-            .into_par_iter()
-            .map(|patch| {
-                let baked = matches!(mesh.patches[patch].lighting, Lighting::Baked(_));
-                baked.then(|| self.bake_patch(mesh, &bvh, &first, patch, samples))
-            })
-            .collect();
-        let mut out = Vec::new();
-        for (patch, map) in mesh.patches.iter_mut().zip(maps) {
-            if let Some(map) = map {
-                patch.lighting = Lighting::Baked(out.len() as u32);
-                out.push(map);
-            }
-        }
-        out
-    }
-
-    fn bake_patch(&self, mesh: &Mesh, bvh: &Bvh, first: &[usize], patch: usize, samples: usize) -> LightMap {
-        let triangles = &mesh.triangles[first[patch]..first[patch + 1]];
-        let [w, h] = extent(mesh, triangles);
-        let cells = |metres: f32| ((metres / SPACING_M).ceil() as usize).clamp(2, 96);
-        let (width, height) = (cells(w), cells(h));
-        let hidden = |o: &Vec3, d: &Vec3, far: f32| bvh.hit(o, d, far);
-        let values = (0..width * height)
-            .map(|i| {
-                // Samples sit on the border too, as bilinear interpolation wants them, but a little inside, so that
-                // they do not start within a wall that the patch touches.
-                let inset = |k: usize, n: usize| (k as f32 / (n - 1) as f32).clamp(0.02, 0.98);
-                let uv = [inset(i % width, width), inset(i / width, height)];
-                match locate(mesh, triangles, uv) {
-                    Some((point, normal)) => self.irradiance(&point, &normal, samples, &hidden),
-                    None => [0.0; 4],
-                }
-            })
-            .collect();
-        LightMap { width, height, values }
-    }
-
     /// Light on a moving vertex: lamps without shadow rays, and the ambient term.
     pub fn on_vertex(&self, point: &Vec3, normal: &Vec3) -> [f32; 3] {
         let mut sum = [0.0; 3];
-        for lamp in &self.lamps {
+        for lamp in self.lamps.iter().filter(|lamp| lamp.matters_at(point)) {
             let to = lamp.center - point;
             let distance2 = to.norm_squared();
             let direction = to / distance2.sqrt();
             // A large lamp lights a little around the corner.
             let facing = (normal.dot(&direction) * 0.8 + 0.2).max(0.0) * (-lamp.normal.dot(&direction)).max(0.0);
-            let area = 4.0 * lamp.half[0].norm() * lamp.half[1].norm();
-            let gain = facing * area / (distance2 + SOFTENING_M2);
+            let gain = facing * lamp.area() / (distance2 + SOFTENING_M2);
             (0..3).for_each(|k| sum[k] += lamp.radiance[k] * gain);
         }
         let ambient = self.ambient_light(normal);
         std::array::from_fn(|k| sum[k] + 0.9 * ambient[k])
-    }
-}
-
-impl LightMap {
-    /// Irradiance at (u, v), bilinear.
-    #[inline]
-    pub fn sample(&self, u: f32, v: f32) -> [f32; 4] {
-        let x = (u * (self.width - 1) as f32).clamp(0.0, (self.width - 1) as f32);
-        let y = (v * (self.height - 1) as f32).clamp(0.0, (self.height - 1) as f32);
-        let (x0, y0) = (x as usize, y as usize);
-        let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(self.height - 1));
-        let (fx, fy) = (x - x0 as f32, y - y0 as f32);
-        let get = |x: usize, y: usize| &self.values[y * self.width + x];
-        let (a, b, c, d) = (get(x0, y0), get(x1, y0), get(x0, y1), get(x1, y1));
-        std::array::from_fn(|k| (a[k] * (1.0 - fx) + b[k] * fx) * (1.0 - fy) + (c[k] * (1.0 - fx) + d[k] * fx) * fy)
     }
 }
 
@@ -215,41 +186,23 @@ fn hemisphere(normal: &Vec3, s: f32, t: f32) -> Vec3 {
     a * (r * cos) + b * (r * sin) + normal * (1.0 - s).max(0.0).sqrt()
 }
 
-/// Index of the first triangle of each patch, and the total at the end; patches are contiguous by construction.
-fn first_triangles(mesh: &Mesh) -> Vec<usize> {
-    (0..=mesh.patches.len() as u32).map(|patch| mesh.triangles.partition_point(|t| t.patch < patch)).collect()
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn extent(mesh: &Mesh, triangles: &[crate::mesh::Triangle]) -> [f32; 2] {
-    // Greatest length per unit of u and v over the triangles' edges.
-    let mut size = [0.0f32; 2];
-    for triangle in triangles {
-        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            let (a, b) = (mesh.vertices[triangle.vertices[i] as usize], mesh.vertices[triangle.vertices[j] as usize]);
-            let span = [(a.uv[0] - b.uv[0]).abs(), (a.uv[1] - b.uv[1]).abs()];
-            let metres = (a.position - b.position).norm();
-            if span[0] > 1e-4 && span[1] < 1e-6 {
-                size[0] = size[0].max(metres / span[0]);
-            } else if span[1] > 1e-4 && span[0] < 1e-6 {
-                size[1] = size[1].max(metres / span[1]);
-            }
-        }
+    fn lamp(x: f32, steady: bool) -> Lamp {
+        let half = [Vec3::x() * 0.3, Vec3::y() * 0.2];
+        Lamp { center: Vec3::new(x, 0.0, 2.5), half, normal: -Vec3::z(), radiance: [2.0, 1.9, 1.8], steady }
     }
-    size
-}
 
-/// Point and normal at `uv`.
-fn locate(mesh: &Mesh, triangles: &[crate::mesh::Triangle], uv: [f32; 2]) -> Option<(Vec3, Vec3)> {
-    triangles.iter().find_map(|triangle| {
-        let [a, b, c] = triangle.vertices.map(|i| mesh.vertices[i as usize]);
-        let cross =
-            |p: [f32; 2], q: [f32; 2], r: [f32; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-        let total = cross(a.uv, b.uv, c.uv);
-        let l = [cross(b.uv, c.uv, uv) / total, cross(c.uv, a.uv, uv) / total, cross(a.uv, b.uv, uv) / total];
-        l.iter().all(|&l| l >= -1e-4).then(|| {
-            let point = a.position * l[0] + b.position * l[1] + c.position * l[2];
-            let normal = (a.normal * l[0] + b.normal * l[1] + c.normal * l[2]).normalize();
-            (point, normal)
-        })
-    })
+    #[test]
+    fn the_flickering_share_of_light_is_what_dimming_takes_away() {
+        let lights = Lights { lamps: vec![lamp(-1.0, true), lamp(1.5, false)], ambient: [[0.3; 3], [0.2; 3]] };
+        let at = |lights: &Lights| lights.irradiance(&Vec3::new(0.4, 0.2, 0.0), &Vec3::z(), 4, &|_, _, _| false);
+        let (full, dim) = (at(&lights), at(&lights.dimmed(0.3)));
+        assert!((0.2..0.8).contains(&full[3]), "{full:?}");
+        let gain = 1.0 + full[3] * (0.3 - 1.0);
+        let (before, after) = (full[..3].iter().sum::<f32>(), dim[..3].iter().sum::<f32>());
+        assert!((before * gain - after).abs() < 1e-4, "{before} times {gain} is not {after}");
+    }
 }

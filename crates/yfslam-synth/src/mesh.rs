@@ -33,12 +33,14 @@ pub struct Triangle {
 /// Where the light on a patch comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lighting {
-    /// Computed when the world is built, for things that never move; index of the light map.
-    Baked(u32),
+    /// From a light map with shadows, for things that never move.
+    Baked,
     /// Interpolated from the vertices, for things that move.
     Vertex,
     /// Shines by itself with this factor on its texture.
     Emissive(f32),
+    /// The same for a lamp that flickers.
+    Lamp(f32),
 }
 
 /// A piece of surface with one texture.

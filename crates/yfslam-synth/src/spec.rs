@@ -4,11 +4,14 @@
 
 use yfslam::Camera;
 
-use crate::config::{SensorConfig, WorldConfig, WorldError, default_camera};
+use crate::config::{Activity, CameraMotion, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera};
 use crate::suite::{DEFAULT_NAME, find, names};
 
 /// Keys of a spec and what they set.
 const KEYS: &[(&str, &str)] = &[
+    ("scene", "office, rescue, corridor or lab"),
+    ("motion", "static, xyz, rpy, halfsphere, drive or loop"),
+    ("activity", "sitting or walking"),
     ("seed", "integer"),
     ("people", "0 to 6"),
     ("frames", "number of frames"),
@@ -24,6 +27,8 @@ const KEYS: &[(&str, &str)] = &[
     ("holes", "on or off: places without depth at edges, on grazing and on dark surfaces"),
     ("boxes", "on or off: exact person boxes as detections"),
     ("shadows", "on or off"),
+    ("exposure", "brightness of the picture, 1 is normal"),
+    ("flicker", "changing light, 0 to 1"),
 ];
 
 /// Whether `text` is meant as a synthetic world (it starts with `synth:`).
@@ -69,6 +74,9 @@ pub fn parse_with_camera(spec: &str, camera: Camera) -> Result<WorldConfig, Worl
 fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
     let camera = &mut config.camera;
     match key {
+        "scene" => config.scene = one_of(key, value, &SceneKind::ALL)?,
+        "motion" => config.motion = one_of(key, value, &CameraMotion::ALL)?,
+        "activity" => config.activity = one_of(key, value, &Activity::ALL)?,
         "seed" => config.seed = number(key, value)?,
         "people" => config.people = number(key, value)?,
         "frames" => config.frames = number(key, value)?,
@@ -107,6 +115,8 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
         }
         "boxes" => config.detections = switch(key, value)?,
         "shadows" => config.light.moving_shadows = switch(key, value)?,
+        "exposure" => config.light.exposure = number(key, value)?,
+        "flicker" => config.light.flicker = number(key, value)?,
         _ => {
             let keys: Vec<String> = KEYS.iter().map(|(key, meaning)| format!("{key} ({meaning})")).collect();
             return Err(format!("unknown key `{key}`; the keys are {}", keys.join(", ")));
@@ -120,6 +130,13 @@ fn number<T: std::str::FromStr>(key: &str, value: &str) -> Result<T, String> {
     value.parse().map_err(|_| format!("`{key}={value}`: `{value}` cannot be read as {meaning}"))
 }
 
+/// The variant named `value`.
+fn one_of<T: Copy>(key: &str, value: &str, all: &[(&str, T)]) -> Result<T, String> {
+    let names = || all.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let found = all.iter().find(|(name, _)| *name == value);
+    found.map(|&(_, variant)| variant).ok_or_else(|| format!("`{key}={value}`: use one of {}", names()))
+}
+
 fn switch(key: &str, value: &str) -> Result<bool, String> {
     match value {
         "on" | "true" | "1" => Ok(true),
@@ -131,7 +148,6 @@ fn switch(key: &str, value: &str) -> Result<bool, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Activity, CameraMotion};
 
     fn message(spec: &str) -> String {
         parse(spec).unwrap_err().to_string()
@@ -159,6 +175,19 @@ mod tests {
         assert!((on.exposure_s - 0.02).abs() < 1e-12 && (on.depth_offset_s + 0.012).abs() < 1e-12);
         assert!(on.auto_exposure > 0.0 && on.holes && on.min_return > 0.0);
         assert!(message("walking_xyz?offset_ms=5000").contains("between -1 and 1 s"));
+    }
+
+    #[test]
+    fn scene_motion_activity_and_light_are_keys_too() {
+        let config =
+            parse("synth:walking_xyz?scene=lab&motion=drive&activity=sitting&exposure=0.3&flicker=0.5").unwrap();
+        assert_eq!(
+            (config.scene, config.motion, config.activity),
+            (SceneKind::Lab, CameraMotion::Drive, Activity::Sitting)
+        );
+        assert_eq!((config.light.exposure, config.light.flicker), (0.3, 0.5));
+        assert!(message("synth:?scene=attic").contains("use one of office, rescue, corridor, lab"));
+        assert!(message("synth:?flicker=2").contains("between 0 and 1"));
     }
 
     #[test]

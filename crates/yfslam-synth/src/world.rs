@@ -10,9 +10,11 @@ use rayon::prelude::*;
 use yfslam::image::{DepthImage, Image, RgbImage};
 use yfslam::{BoundingBox, Camera, Detection, RgbdFrame};
 
+use crate::bake::Baker;
 use crate::camera_path::CameraPath;
 use crate::config::{WorldConfig, WorldError, default_camera};
-use crate::light::{LightMap, Lights, Occluder};
+use crate::flicker;
+use crate::light::{Lights, Occluder};
 use crate::people::People;
 use crate::render::rays::RayTable;
 use crate::render::shade::View;
@@ -22,7 +24,7 @@ use crate::scene::Scene;
 use crate::sensor;
 use crate::sensor::blur::CameraMove;
 use crate::sensor::exposure::Meter;
-use crate::texture::Texture;
+use crate::surfaces::Surfaces;
 
 /// Names of the classes of [`SynthFrame`]'s detections, by [`Detection::class`].
 pub const CLASS_NAMES: [&str; 1] = ["person"];
@@ -37,8 +39,7 @@ pub struct World {
     scene: Scene,
     people: People,
     path: CameraPath,
-    textures: Vec<Texture>,
-    light_maps: Vec<LightMap>,
+    surfaces: Surfaces,
     rays: RayTable,
     /// Rays of a small picture, for estimates over the whole view.
     small_rays: RayTable,
@@ -64,7 +65,7 @@ pub struct SynthFrame {
 }
 
 impl World {
-    /// Builds the scene, paints its textures, bakes its light and plans everyone's way.
+    /// Builds the scene and plans everyone's way. Textures are painted and light is baked when a frame first shows them.
     ///
     /// # Errors
     /// If a value of the configuration is out of range.
@@ -74,17 +75,16 @@ impl World {
         let people = People::new(&mut scene, config);
         // Textures for the default focal length suit any other when they have as many more or fewer texels.
         let sharpness = config.camera.fx.max(config.camera.fy) / default_camera().fx;
-        let textures = scene.palette.paint(sharpness.clamp(0.05, 3.0) as f32);
-        let lights = scene.lights.clone();
-        let light_maps = lights.bake(&mut scene.mesh, config.light.shadow_rays);
-        let path = CameraPath::new(config.motion, scene.camera, config.hand_shake, config.seed);
+        let baker = Baker::new(&scene.mesh, scene.lights.clone(), config.light.shadow_rays);
+        let palette = std::mem::take(&mut scene.palette);
+        let surfaces = Surfaces::new(palette, sharpness.clamp(0.05, 3.0) as f32, &scene.mesh, baker);
+        let path = CameraPath::new(config, &scene);
         let rays = RayTable::new(&config.camera);
         let small_rays = RayTable::new(&shrink(&config.camera, SMALL_WIDTH));
         let seconds = config.frames as f64 / config.camera.fps;
         let meter = Meter::new(seconds, config.sensor.auto_exposure, hash(config.seed, 0xae));
         let config = config.clone();
-        let mut world =
-            Self { config, scene, people, path, textures, light_maps, rays, small_rays, meter, person_share: 0.0 };
+        let mut world = Self { config, scene, people, path, surfaces, rays, small_rays, meter, person_share: 0.0 };
         world.choose_distance();
         Ok(world)
     }
@@ -146,14 +146,15 @@ impl World {
     }
 
     fn render(&self, rays: &RayTable, time: f64, t_world_cam: &Isometry3<f64>) -> Picture {
-        let (people, occluders) = self.people.at(time, &self.scene.lights);
+        let brightness = flicker::brightness(self.config.light.flicker, self.config.seed, time);
+        let (people, occluders) = self.people.at(time, &self.scene.lights.dimmed(brightness));
         let t_cam_world = t_world_cam.inverse();
         let nearby =
             if self.config.light.moving_shadows { self.in_camera(&occluders, &t_cam_world) } else { Vec::new() };
         let view = View {
             meshes: [&self.scene.mesh, &people],
-            textures: &self.textures,
-            light_maps: &self.light_maps,
+            surfaces: &self.surfaces,
+            brightness,
             occluders: &nearby,
             r_cam_world: t_cam_world.rotation.cast(),
             pitch: rays.pitch,

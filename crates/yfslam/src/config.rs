@@ -200,6 +200,62 @@ config_section! {
 }
 
 config_section! {
+    /// Recognising places (ORB-SLAM, IEEE T-RO 2015, sections III-E and V-C).
+    PlaceConfig {
+        /// Largest Hamming distance of a feature to a landmark that it may show. Source: ORB-SLAM2's TH_LOW.
+        max_distance: u32 = 50,
+        /// Landmarks that a feature may vote for, the nearest first: the same pattern may be seen at several places.
+        landmarks_per_feature: usize = 5,
+        /// Places that are examined at most.
+        candidates: usize = 5,
+        /// Covisible keyframes that make up a place together with the best one. Source: ORB-SLAM.
+        group_keyframes: usize = 10,
+        /// Matches that a place needs to be examined. Source: ORB-SLAM2.
+        min_matches: usize = 15,
+        /// Random samples drawn at most. Source: ORB-SLAM2.
+        max_draws: u32 = 300,
+        /// Draws end when a better pose is less likely than one minus this. Source: ORB-SLAM2.
+        confidence: f64 = 0.99,
+        /// Matches that must fit a pose from three of them. Source: ORB-SLAM2.
+        min_ransac_inliers: usize = 10,
+        /// Matches that must fit the refined pose before more are sought with it. Source: ORB-SLAM2.
+        min_refined_inliers: usize = 10,
+        /// Landmarks that must fit a frame that was lost. Source: ORB-SLAM2.
+        relocalise_min_inliers: usize = 50,
+        /// Seed of the random draws.
+        seed: u64 = 0,
+    }
+}
+
+config_section! {
+    /// Closing loops (ORB-SLAM, IEEE T-RO 2015, section VII; ORB-SLAM2, IEEE T-RO 2017, section III-C).
+    LoopConfig {
+        /// Whether loops are closed.
+        enabled: bool = true,
+        /// Keyframes in a row that must agree on the old place. Source: ORB-SLAM.
+        min_consistent: usize = 3,
+        /// Keyframes between two loops at least. Source: ORB-SLAM2.
+        min_keyframes_between: u64 = 10,
+        /// Landmarks of the old place that must fit the keyframe. Source: ORB-SLAM2.
+        min_inliers: usize = 40,
+        /// Shared landmarks that make an edge of the pose graph. Source: ORB-SLAM.
+        strong_weight: usize = 100,
+    }
+}
+
+config_section! {
+    /// Pose-graph optimisation (ORB-SLAM, IEEE T-RO 2015, section VII-D).
+    PoseGraphConfig {
+        /// Steps at most. Source: ORB-SLAM2.
+        iterations: usize = 20,
+        /// It ends when a step gains less than this share of the cost.
+        relative_tolerance: f64 = 1e-4,
+        /// First damping, relative to the diagonal.
+        initial_damping: f64 = 1e-8,
+    }
+}
+
+config_section! {
     /// Keeping moving things out (YF-SLAM, section 3.3).
     DynamicConfig {
         /// `none` (ORB-SLAM2), `boxes` (all features in boxes dropped) or `yf` (the paper).
@@ -256,10 +312,16 @@ config_section! {
         keyframes: KeyframeConfig = KeyframeConfig::default(),
         /// Mapping.
         mapping: MappingConfig = MappingConfig::default(),
+        /// Place recognition.
+        places: PlaceConfig = PlaceConfig::default(),
+        /// Loop closing.
+        loops: LoopConfig = LoopConfig::default(),
         /// Motion-only optimisation.
         pose: PoseOptimizerConfig = PoseOptimizerConfig::default(),
         /// Bundle adjustment.
         bundle: BundleConfig = BundleConfig::default(),
+        /// Pose-graph optimisation.
+        pose_graph: PoseGraphConfig = PoseGraphConfig::default(),
     }
 }
 
@@ -271,8 +333,11 @@ const SECTIONS: &[(&str, &str, FieldDocs)] = &[
     ("tracking", TrackingConfig::ABOUT, TrackingConfig::FIELDS),
     ("keyframes", KeyframeConfig::ABOUT, KeyframeConfig::FIELDS),
     ("mapping", MappingConfig::ABOUT, MappingConfig::FIELDS),
+    ("places", PlaceConfig::ABOUT, PlaceConfig::FIELDS),
+    ("loops", LoopConfig::ABOUT, LoopConfig::FIELDS),
     ("pose", PoseOptimizerConfig::ABOUT, PoseOptimizerConfig::FIELDS),
     ("bundle", BundleConfig::ABOUT, BundleConfig::FIELDS),
+    ("pose_graph", PoseGraphConfig::ABOUT, PoseGraphConfig::FIELDS),
 ];
 
 impl Config {
@@ -334,8 +399,8 @@ impl Config {
             (
                 "features.scale_factor",
                 f.scale_factor.to_string(),
-                f.scale_factor > 1.0 && f.scale_factor <= 4.0,
-                "above 1, at most 4",
+                f.scale_factor > 1.0 && f.scale_factor <= 2.0,
+                "above 1, at most 2",
             ),
             ("features.cell_px", f.cell_px.to_string(), f.cell_px > 0, "at least 1 px"),
             (

@@ -20,6 +20,8 @@
 //! | [`dynamic`] | how far a feature may be trusted to be static; nothing else knows that people exist |
 //! | [`tracking`] | the pose of each frame; when to make a keyframe |
 //! | [`mapping`] | growth and refinement of the map |
+//! | [`loops`] | places seen before: the way back when lost, and loops to close |
+//! | [`backend`] | the owner of the map, on the calling thread or its own |
 //! | [`system`] | the whole path |
 //!
 //! Frames are named: `t_cam_world` maps points of the world into the camera. Lengths are metres, times integer nanoseconds. The same
@@ -48,6 +50,7 @@
 //! ```
 #![warn(missing_docs)]
 
+pub mod backend;
 pub mod camera;
 pub mod config;
 pub mod detection;
@@ -57,6 +60,7 @@ pub mod features;
 pub mod frame;
 pub mod geometry;
 pub mod image;
+pub mod loops;
 pub mod map;
 pub mod mapping;
 pub mod optimize;
@@ -64,8 +68,9 @@ pub mod sensor;
 pub mod system;
 pub mod tracking;
 
+pub use backend::Execution;
 pub use camera::Camera;
 pub use config::Config;
 pub use detection::{BoundingBox, Detection, Detector, DetectorError};
 pub use frame::RgbdFrame;
-pub use system::{FrameRejected, SetupError, Slam, Tracked};
+pub use system::{FrameRejected, MapUse, SetupError, Slam, Tracked};

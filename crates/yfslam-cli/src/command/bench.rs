@@ -68,10 +68,10 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
         jobs: args.jobs.into(),
         extra: args.extra.clone(),
     };
-    let progress = Mutex::new(Progress::new(terminal, "runs", plans.len()));
+    let progress = Mutex::new(Progress::new(terminal, "bench", plans.len()));
     let cells = bench.cells(&plans, |done| {
         if let Ok(mut progress) = progress.lock() {
-            progress.at(done, String::new);
+            progress.at(done, "runs", String::new);
         }
     })?;
     if let Ok(progress) = progress.into_inner() {

@@ -49,6 +49,7 @@ pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antial
     let triangles = project_all(rays, t_cam_world, view);
     let mut seen = Visibility::empty(rays);
     seen.add(rays, &triangles);
+    view.prepare(&triangles, &seen.triangle);
     let painter = Painter { rays, view, triangles: &triangles, seen: &seen, antialias };
     let bands: Vec<Picture> = (0..rays.bands.len())
         .into_par_iter()

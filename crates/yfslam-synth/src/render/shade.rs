@@ -5,8 +5,10 @@
 //! the mip level (Williams, "Pyramidal parametrics", SIGGRAPH 1983), follows in closed form.
 
 use super::project::Projected;
-use crate::light::{LightMap, Occluder};
+use crate::bake::LightMap;
+use crate::light::Occluder;
 use crate::mesh::{Lighting, Mesh, Vec3};
+use crate::surfaces::Surfaces;
 use crate::texture::Texture;
 
 /// All that shading reads.
@@ -14,10 +16,10 @@ use crate::texture::Texture;
 pub struct View<'a> {
     /// Meshes by [`Projected::mesh`].
     pub meshes: [&'a Mesh; 2],
-    /// Textures by index.
-    pub textures: &'a [Texture],
-    /// Light maps by index.
-    pub light_maps: &'a [LightMap],
+    /// Textures and light maps.
+    pub surfaces: &'a Surfaces,
+    /// Brightness of flickering lamps.
+    pub brightness: f32,
     /// Bodies that darken what is near them; positions in camera coordinates.
     pub occluders: &'a [Occluder],
     /// Rotation from world to camera.
@@ -65,6 +67,21 @@ impl<'a> View<'a> {
         mesh.patches[mesh.triangles[t.triangle as usize].patch as usize].instance
     }
 
+    /// Makes the textures and light maps of everything that is seen.
+    pub fn prepare(&self, triangles: &[Projected], seen: &[u32]) {
+        let mut visible = vec![false; triangles.len()];
+        for &id in seen {
+            if let Some(visible) = visible.get_mut(id as usize) {
+                *visible = true;
+            }
+        }
+        let patches = triangles.iter().zip(visible).filter(|(_, visible)| *visible).map(|(t, _)| {
+            let mesh = self.meshes[usize::from(t.mesh)];
+            (mesh, mesh.triangles[t.triangle as usize].patch)
+        });
+        self.surfaces.prepare(self.meshes[0], patches);
+    }
+
     /// Number that tells patches of all meshes apart.
     pub fn patch(&self, t: &Projected) -> u32 {
         (self.meshes[usize::from(t.mesh)].triangles[t.triangle as usize].patch << 1) | u32::from(t.mesh)
@@ -82,12 +99,13 @@ impl<'a> View<'a> {
         };
         let constant = |value: f32| t.inverse_depth.map(|c| c * value);
         let (light_map, light) = match patch.lighting {
-            Lighting::Baked(index) => (self.light_maps.get(index as usize), [[0.0; 3]; 3]),
+            Lighting::Baked => (Some(self.surfaces.light_map(self.meshes[0], triangle.patch)), [[0.0; 3]; 3]),
             Lighting::Vertex => (None, std::array::from_fn(|k| plane(v.map(|v| v.light[k])))),
             Lighting::Emissive(factor) => (None, [constant(factor); 3]),
+            Lighting::Lamp(factor) => (None, [constant(factor * self.brightness); 3]),
         };
         Surface {
-            texture: &self.textures[patch.texture as usize],
+            texture: self.surfaces.texture(patch.texture),
             light_map,
             inverse_depth: t.inverse_depth,
             u: plane(v.map(|v| v.uv[0])),
@@ -95,7 +113,7 @@ impl<'a> View<'a> {
             light,
             reflectance: match patch.lighting {
                 Lighting::Emissive(_) => GLASS,
-                _ => self.textures[patch.texture as usize].mean(),
+                _ => self.surfaces.texture(patch.texture).mean(),
             },
             normal: self.r_cam_world * (v[0].normal + v[1].normal + v[2].normal).normalize(),
         }
@@ -127,7 +145,11 @@ impl<'a> View<'a> {
             surface.texture.sample(u, v, 0.5 * log2(long))
         };
         let light = match surface.light_map {
-            Some(map) => map.sample(u, v),
+            Some(map) => {
+                let [r, g, b, flickering] = map.sample(u, v);
+                let gain = 1.0 + flickering * (self.brightness - 1.0);
+                [r * gain, g * gain, b * gain, 0.0]
+            }
             None => {
                 let [r, g, b] = surface.light.map(|plane| at(&plane, x, y) * z);
                 [r, g, b, 0.0]

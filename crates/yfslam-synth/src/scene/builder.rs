@@ -3,8 +3,8 @@
 //! In: shapes in metres and materials. Out: a static mesh and the list of textures that it needs.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-use rayon::prelude::*;
 
+use crate::light::Lamp;
 use crate::mesh::{Lighting, Mesh, Patch, Vec3};
 use crate::rng::Rng;
 use crate::texture::Texture;
@@ -19,7 +19,7 @@ struct Order {
     seed: u64,
 }
 
-/// Collects textures before they are painted, all at once and in parallel.
+/// Collects textures before they are painted.
 #[derive(Clone, Debug, Default)]
 pub struct Palette {
     orders: Vec<Order>,
@@ -32,10 +32,15 @@ impl Palette {
         (self.orders.len() - 1) as u32
     }
 
-    /// Paints everything that was ordered, with `sharpness` times the texels per metre.
-    pub fn paint(&self, sharpness: f32) -> Vec<Texture> {
-        let paint = |o: &Order| Texture::new(&o.material.paint(o.size_m, o.density * sharpness, o.seed));
-        self.orders.par_iter().map(paint).collect()
+    /// Number of textures that were ordered.
+    pub fn len(&self) -> usize {
+        self.orders.len()
+    }
+
+    /// Paints order number `index` with `sharpness` times the texels per metre.
+    pub fn paint(&self, index: usize, sharpness: f32) -> Texture {
+        let o = &self.orders[index];
+        Texture::new(&o.material.paint(o.size_m, o.density * sharpness, o.seed))
     }
 }
 
@@ -79,7 +84,7 @@ impl Builder {
     pub fn patch(&mut self, material: Material, size_m: [f32; 2]) -> Patch {
         let seed = self.rng.bits();
         let texture = self.palette.order(material, size_m, self.density * material.detail(), seed);
-        Patch { texture, lighting: Lighting::Baked(0), instance: 0 }
+        Patch { texture, lighting: Lighting::Baked, instance: 0 }
     }
 
     /// A flat rectangle; `right` and `down` are its edges as seen from outside.
@@ -94,8 +99,23 @@ impl Builder {
         self.mesh.rectangle(top_left, right, down, Patch { lighting: Lighting::Emissive(factor), ..patch });
     }
 
+    /// A lamp under the ceiling whose panel glows with `factor`, with half edges along x and y.
+    pub fn lamp(&mut self, center: Vec3, half: [Vec3; 2], factor: f32, radiance: [f32; 3], steady: bool) -> Lamp {
+        let strongest = radiance.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        let [right, down] = half.map(|edge| edge * 2.0);
+        let patch = self.patch(Material::Plain(radiance.map(|c| (c / strongest).sqrt())), [right.norm(), down.norm()]);
+        let lighting = if steady { Lighting::Emissive(factor) } else { Lighting::Lamp(factor) };
+        self.mesh.rectangle(center - half[0] - half[1], right, down, Patch { lighting, ..patch });
+        Lamp { center, half, normal: -Vec3::z(), radiance, steady }
+    }
+
     /// A box that stands on `base` (the middle of its bottom), turned by `yaw` about the vertical.
     pub fn cuboid(&mut self, base: Vec3, size: Vec3, yaw: f32, material: impl Fn(Side) -> Material) {
+        self.tilted(upright(base, yaw), size, material);
+    }
+
+    /// A box with the middle of its bottom at the origin of `pose`.
+    pub fn tilted(&mut self, pose: Isometry3<f32>, size: Vec3, material: impl Fn(Side) -> Material) {
         let first = self.mesh.vertices.len();
         let h = Vec3::new(size.x / 2.0, size.y / 2.0, size.z);
         let (dx, dy, dz) = (Vec3::x() * size.x, Vec3::y() * size.y, Vec3::z() * size.z);
@@ -110,12 +130,33 @@ impl Builder {
             // The underside of what lies on the floor is never seen, and the camera hardly gets behind things.
             let density = self.density;
             self.density = if matches!(side, Side::Back | Side::Bottom) { 0.4 * density } else { density };
-            if side != Side::Bottom || base.z > 0.01 {
+            if side != Side::Bottom || pose.translation.z > 0.01 {
                 self.rectangle(corner, right, down, material(side));
             }
             self.density = density;
         }
-        self.mesh.transform_from(first, &upright(base, yaw));
+        self.mesh.transform_from(first, &pose);
+    }
+
+    /// A broken piece: a box around the origin of `pose` whose corners are knocked inwards, each by its own draw.
+    pub fn chunk(&mut self, pose: Isometry3<f32>, size: Vec3, material: Material) {
+        let first = self.mesh.vertices.len();
+        let corners: [Vec3; 8] = std::array::from_fn(|k| {
+            let sign = |bit: usize| if k >> bit & 1 == 1 { 0.5 } else { -0.5 };
+            let knock = Vec3::from_fn(|_, _| self.rng.range(0.45, 1.0));
+            Vec3::new(sign(0), sign(1), sign(2)).component_mul(&size).component_mul(&knock)
+        });
+        // Top left, top right, bottom left, bottom right of each side, seen from outside.
+        for side in [[4, 5, 0, 1], [7, 6, 3, 2], [6, 4, 2, 0], [5, 7, 1, 3], [6, 7, 4, 5], [0, 1, 2, 3]] {
+            let [a, b, c, d] = side.map(|k| corners[k]);
+            let patch = self.patch(material, [(b - a).norm(), (c - a).norm()]);
+            let normal = (c - b).cross(&(d - a)).normalize();
+            let surface = |u: f32, v: f32| {
+                (a * (1.0 - u) * (1.0 - v) + b * u * (1.0 - v) + c * (1.0 - u) * v + d * u * v, normal)
+            };
+            self.mesh.grid(1, 1, patch, surface);
+        }
+        self.mesh.transform_from(first, &pose);
     }
 
     /// A body of revolution that stands on `base`; rings are (height, radius), top first.

@@ -1,8 +1,12 @@
 //! Places: a static mesh, its lights, where the camera stands and where people may be.
 
 pub mod builder;
+mod corridor;
 mod furniture;
+mod lab;
 mod office;
+mod rescue;
+mod wall;
 
 use nalgebra::{Isometry3, Point3};
 
@@ -39,6 +43,8 @@ pub struct Scene {
     pub walk_far_y: f64,
     /// Range of y for the near side of the walk: closest to the camera first, m.
     pub walk_near_y: [f64; 2],
+    /// Corners of a closed round on the floor along which a camera can be carried or driven, the first on a straight, m.
+    pub round: Vec<[f64; 2]>,
     /// Where people can sit.
     pub seats: Vec<Seat>,
     /// Where people can stand without being in the way: position on the floor and heading.
@@ -50,6 +56,9 @@ impl Scene {
     pub fn new(kind: SceneKind, seed: u64) -> Self {
         match kind {
             SceneKind::Office => office::build(seed),
+            SceneKind::Rescue => rescue::build(seed),
+            SceneKind::Corridor => corridor::build(seed),
+            SceneKind::Lab => lab::build(seed),
         }
     }
 }

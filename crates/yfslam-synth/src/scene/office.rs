@@ -41,6 +41,7 @@ pub fn build(seed: u64) -> Scene {
         walk_far_y: 2.3,
         walk_near_y: [-1.1, -0.75],
         seats,
+        round: vec![[0.0, -1.2], [-2.05, -1.0], [-2.05, 2.3], [2.1, 2.3], [2.1, -1.0]],
         stands: vec![stand(-1.75, 0.6, -2.0), stand(1.8, 0.7, 2.2), stand(-0.5, 2.1, PI), stand(0.7, 2.2, -2.6)],
     }
 }
@@ -70,6 +71,7 @@ fn room(b: &mut Builder) -> Vec<Lamp> {
         half: [Vec3::y() * 0.9, Vec3::z() * 0.6],
         normal: -Vec3::x(),
         radiance: [1.00, 1.12, 1.30],
+        steady: true,
     };
     b.density = 250.0;
     b.glowing(corner(EAST - 0.02, 1.5, 2.2), -Vec3::y() * 1.8, -Vec3::z() * 1.2, Material::Outdoors, 1.1);
@@ -82,9 +84,7 @@ fn room(b: &mut Builder) -> Vec<Lamp> {
     for (x, y) in [(-1.3, -0.6), (1.3, -0.6), (-1.3, 1.6), (1.3, 1.6)] {
         let half = [Vec3::x() * 0.6, Vec3::y() * 0.15];
         let center = corner(x, y, HEIGHT - 0.03);
-        let top_left = center - half[0] - half[1];
-        b.glowing(top_left, half[0] * 2.0, half[1] * 2.0, Material::Plain([1.0, 0.98, 0.94]), 1.3);
-        lamps.push(Lamp { center, half, normal: -Vec3::z(), radiance: [2.7, 2.62, 2.46] });
+        lamps.push(b.lamp(center, half, 1.3, [2.7, 2.62, 2.46], false));
     }
     lamps
 }

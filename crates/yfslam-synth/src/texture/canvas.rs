@@ -1,5 +1,6 @@
 //! A canvas to paint textures on: filled shapes and text in pixels, every colour in gamma-2 space.
 
+use super::noise::Field;
 use super::{Color, font};
 
 /// Colour picture of f32 channels, row-major, top row first.
@@ -40,6 +41,26 @@ impl Canvas {
     /// Replaces every pixel by `shade(x, y, old)`, x and y in pixels; the result is clamped to [0, 1].
     pub fn shade(&mut self, shade: impl Fn(f32, f32, Color) -> Color) {
         self.shade_within(0.0, 0.0, self.width as f32, self.height as f32, shade);
+    }
+
+    /// Fractal noise for this canvas whose pixels are `step` cells wide and high.
+    pub fn field(&self, seed: u64, step: [f32; 2], octaves: u32) -> Field {
+        Field::new(seed, self.width, step, octaves)
+    }
+
+    /// [`Canvas::shade`] with the values of noise fields at the pixel: `shade(x, y, old, values)`.
+    pub fn shade_with<const N: usize>(
+        &mut self,
+        mut fields: [Field; N],
+        shade: impl Fn(f32, f32, Color, [f32; N]) -> Color,
+    ) {
+        for (y, row) in self.pixels.chunks_mut(self.width).enumerate() {
+            let values = fields.each_mut().map(|field| field.row(y));
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let here = std::array::from_fn(|k| values[k][x]);
+                *pixel = shade(x as f32 + 0.5, y as f32 + 0.5, *pixel, here).map(|c| c.clamp(0.0, 1.0));
+            }
+        }
     }
 
     /// [`Canvas::shade`] for the pixels whose centres lie in the rectangle.

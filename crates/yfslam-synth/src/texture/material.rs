@@ -5,7 +5,7 @@
 
 use super::canvas::Canvas;
 use super::noise::{cell, fractal};
-use super::{Color, print};
+use super::{Color, building, print};
 use crate::rng::Rng;
 
 /// Patterns of clothes.
@@ -64,6 +64,28 @@ pub enum Material {
     Hair(Color),
     /// Leaves of a plant.
     Leaves,
+    /// Raw concrete: stains, formwork joints, tie holes and cracks.
+    Concrete(Color),
+    /// A white wall with hardly any texture.
+    Paint(Color),
+    /// A sheet of vinyl floor with welded seams along its border.
+    Vinyl(Color),
+    /// A door leaf in its frame, with a handle and a plate.
+    Door(Color),
+    /// A small printed sign on coloured ground.
+    Sign(Color),
+    /// Black and yellow warning stripes, worn.
+    Hazard,
+    /// A cork board with papers.
+    NoticeBoard,
+    /// The ribs of a radiator or grille.
+    Ribs(Color),
+    /// The planks of a crate.
+    Planks(Color),
+    /// Lacquer that rust has eaten into.
+    Rusty(Color),
+    /// A double power socket.
+    Socket,
 }
 
 impl Material {
@@ -71,7 +93,7 @@ impl Material {
     pub fn detail(&self) -> f32 {
         match self {
             Self::Plain(_) | Self::Pages | Self::Hair(_) => 0.4,
-            Self::Cloth(_) | Self::Leaves => 0.7,
+            Self::Cloth(_) | Self::Leaves | Self::Paint(_) => 0.7,
             _ => 1.0,
         }
     }
@@ -104,6 +126,17 @@ impl Material {
             Self::Head(skin, hair) => head(&mut canvas, skin, hair, seed),
             Self::Hair(color) => hair_strands(&mut canvas, color, seed),
             Self::Leaves => leaves(&mut canvas, m, seed),
+            Self::Concrete(color) => building::concrete(&mut canvas, color, m, seed, &mut rng),
+            Self::Paint(color) => building::paint(&mut canvas, color, m, seed, &mut rng),
+            Self::Vinyl(color) => building::vinyl(&mut canvas, color, m, seed),
+            Self::Door(color) => building::door(&mut canvas, color, m, seed, &mut rng),
+            Self::Sign(color) => building::sign(&mut canvas, color, &mut rng),
+            Self::Hazard => building::hazard(&mut canvas, m, seed),
+            Self::NoticeBoard => building::notice_board(&mut canvas, m, seed, &mut rng),
+            Self::Ribs(color) => building::ribs(&mut canvas, color, m, seed),
+            Self::Planks(color) => building::planks(&mut canvas, color, m, seed, &mut rng),
+            Self::Rusty(color) => building::rusty(&mut canvas, color, m, seed),
+            Self::Socket => building::socket(&mut canvas),
         }
         canvas
     }
@@ -120,10 +153,9 @@ pub fn blend(a: Color, b: Color, t: f32) -> Color {
 }
 
 fn floor(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
-    canvas.shade(|x, y, _| {
-        let (x, y) = (x * m, y * m);
-        let worn = fractal(seed, x * 1.3, y * 1.3, 4) - 0.5;
-        let marble = fractal(seed ^ 1, x * 9.0 + 2.0 * worn, y * 9.0, 4) - 0.5;
+    let fields = [canvas.field(seed, [1.3 * m; 2], 4), canvas.field(seed ^ 1, [9.0 * m; 2], 4)];
+    canvas.shade_with(fields, |x, y, _, [worn, marble]| {
+        let (x, y, worn, marble) = (x * m, y * m, worn - 0.5, marble - 0.5);
         // Coloured chips of 8 to 16 mm, a fifth of the cells.
         let chip = cell(seed ^ 2, x * 90.0 + marble * 3.0, y * 90.0 + worn * 3.0);
         let chip = if chip > 0.93 {
@@ -138,12 +170,9 @@ fn floor(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
 }
 
 fn plaster(canvas: &mut Canvas, color: Color, m: f32, seed: u64, rng: &mut Rng) {
-    canvas.shade(|x, y, _| {
-        let (x, y) = (x * m, y * m);
-        let roller = fractal(seed, x * 2.0, y * 0.7, 3) - 0.5;
-        let grain = fractal(seed ^ 1, x * 35.0, y * 35.0, 3) - 0.5;
-        tint(color, 1.0 + 0.05 * roller + 0.05 * grain)
-    });
+    let fields = [canvas.field(seed, [2.0 * m, 0.7 * m], 3), canvas.field(seed ^ 1, [35.0 * m; 2], 3)];
+    canvas
+        .shade_with(fields, |_, _, _, [roller, grain]| tint(color, 1.0 + 0.05 * (roller - 0.5) + 0.05 * (grain - 0.5)));
     let area = canvas.width() as f32 * canvas.height() as f32 * m * m;
     for _ in 0..(area * 3.0) as usize {
         let at = [rng.range(0.0, canvas.width() as f32), rng.range(0.0, canvas.height() as f32)];
@@ -159,21 +188,21 @@ fn plaster(canvas: &mut Canvas, color: Color, m: f32, seed: u64, rng: &mut Rng) 
 
 fn wood(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
     let along_x = canvas.width() >= canvas.height();
-    canvas.shade(|x, y, _| {
+    let step = |s: f32, t: f32| if along_x { [s * m, t * m] } else { [t * m, s * m] };
+    let fields = [canvas.field(seed, step(1.1, 3.0), 3), canvas.field(seed ^ 1, step(14.0, 260.0), 2)];
+    canvas.shade_with(fields, |x, y, _, [bend, fibre]| {
         let (s, t) = if along_x { (x * m, y * m) } else { (y * m, x * m) };
-        let bend = fractal(seed, s * 1.1, t * 3.0, 3);
         let rings = ((t * 38.0 + bend * 9.0) * std::f32::consts::TAU * 0.5).sin();
-        let fibre = fractal(seed ^ 1, s * 14.0, t * 260.0, 2) - 0.5;
+        let fibre = fibre - 0.5;
         let pore = if cell(seed ^ 2, s * 60.0, t * 500.0) > 0.97 { -0.25 } else { 0.0 };
         tint(color, 0.95 + 0.07 * rings + 0.18 * fibre + 0.2 * (bend - 0.5) + pore)
     });
 }
 
 fn plain(canvas: &mut Canvas, color: Color, m: f32, seed: u64, rng: &mut Rng) {
-    canvas.shade(|x, y, _| {
-        let cloud = fractal(seed, x * m * 6.0, y * m * 6.0, 3) - 0.5;
+    canvas.shade_with([canvas.field(seed, [6.0 * m; 2], 3)], |x, y, _, [cloud]| {
         let grain = cell(seed ^ 1, x * m * 300.0, y * m * 300.0) - 0.5;
-        tint(color, 1.0 + 0.12 * cloud + 0.04 * grain)
+        tint(color, 1.0 + 0.12 * (cloud - 0.5) + 0.04 * grain)
     });
     let area = canvas.width() as f32 * canvas.height() as f32 * m * m;
     for _ in 0..(area * 12.0) as usize {
@@ -184,10 +213,9 @@ fn plain(canvas: &mut Canvas, color: Color, m: f32, seed: u64, rng: &mut Rng) {
 }
 
 fn ceiling(canvas: &mut Canvas, m: f32, seed: u64) {
-    canvas.shade(|x, y, _| {
-        let (x, y) = (x * m, y * m);
+    canvas.shade_with([canvas.field(seed ^ 1, [1.5 * m; 2], 3)], |x, y, _, [stain]| {
+        let (x, y, stain) = (x * m, y * m, stain - 0.5);
         let hole = cell(seed, x * 70.0, y * 70.0) > 0.90;
-        let stain = fractal(seed ^ 1, x * 1.5, y * 1.5, 3) - 0.5;
         // Tiles of 0.6 m with a dark joint of 1 cm.
         let joint = (x / 0.6).fract() * 0.6 < 0.01 || (y / 0.6).fract() * 0.6 < 0.01;
         let level = if joint {
@@ -209,10 +237,9 @@ fn pages(canvas: &mut Canvas, seed: u64) {
 }
 
 fn cloth(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
-    canvas.shade(|x, y, _| {
+    canvas.shade_with([canvas.field(seed ^ 1, [7.0 * m, 4.0 * m], 4)], |x, y, _, [fold]| {
         let weave = cell(seed, x * m * 350.0, y * m * 350.0) - 0.5;
-        let fold = fractal(seed ^ 1, x * m * 7.0, y * m * 4.0, 4) - 0.5;
-        tint(color, 1.0 + 0.16 * weave + 0.45 * fold)
+        tint(color, 1.0 + 0.16 * weave + 0.45 * (fold - 0.5))
     });
 }
 
@@ -251,10 +278,9 @@ fn shirt(canvas: &mut Canvas, [base, accent]: [Color; 2], pattern: Pattern, m: f
             }
         }
     }
-    canvas.shade(|x, y, old| {
+    canvas.shade_with([canvas.field(seed ^ 1, [8.0 * m, 5.0 * m], 4)], |x, y, old, [fold]| {
         let weave = cell(seed, x * m * 330.0, y * m * 330.0) - 0.5;
-        let fold = fractal(seed ^ 1, x * m * 8.0, y * m * 5.0, 4) - 0.5;
-        tint(old, 1.0 + 0.10 * weave + 0.40 * fold)
+        tint(old, 1.0 + 0.10 * weave + 0.40 * (fold - 0.5))
     });
 }
 
@@ -297,13 +323,14 @@ fn head(canvas: &mut Canvas, skin: Color, hair: Color, seed: u64) {
 }
 
 fn hair_strands(canvas: &mut Canvas, color: Color, seed: u64) {
-    canvas.shade(|x, y, _| tint(color, 1.0 + 0.8 * (fractal(seed, x * 0.6, y * 0.06, 3) - 0.5)));
+    let strands = canvas.field(seed, [0.6, 0.06], 3);
+    canvas.shade_with([strands], |_, _, _, [strand]| tint(color, 1.0 + 0.8 * (strand - 0.5)));
 }
 
 fn leaves(canvas: &mut Canvas, m: f32, seed: u64) {
-    canvas.shade(|x, y, _| {
-        let leaf = cell(seed, x * m * 25.0 + fractal(seed ^ 3, x * m * 9.0, y * m * 9.0, 2) * 3.0, y * m * 18.0);
-        let shade = fractal(seed ^ 1, x * m * 30.0, y * m * 30.0, 3);
+    let fields = [canvas.field(seed ^ 3, [9.0 * m; 2], 2), canvas.field(seed ^ 1, [30.0 * m; 2], 3)];
+    canvas.shade_with(fields, |x, y, _, [bend, shade]| {
+        let leaf = cell(seed, x * m * 25.0 + bend * 3.0, y * m * 18.0);
         tint([0.30, 0.52, 0.22], 0.45 + 0.7 * leaf + 0.3 * (shade - 0.5))
     });
 }

@@ -3,6 +3,7 @@
 //! In: painted canvases. Out: mip chains and filtered colours. Colours are stored and filtered in "gamma 2" space: the
 //! stored value is the square root of linear light, close to sRGB, so that eight bits suffice and decoding is a square.
 
+mod building;
 pub mod canvas;
 pub mod font;
 pub mod material;

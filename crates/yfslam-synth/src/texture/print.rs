@@ -1,11 +1,11 @@
 //! Printed matter: posters, books, paper, boxes, screens, keyboards, whiteboards. Rectangles and letters of many sizes
 //! give corners at every scale.
 
+use super::Color;
 use super::canvas::Canvas;
 use super::font::WORDS;
 use super::material::{blend, tint};
 use super::noise::{cell, fractal};
-use super::{Color, noise};
 use crate::rng::Rng;
 
 const INKS: [Color; 9] = [
@@ -19,8 +19,8 @@ const INKS: [Color; 9] = [
     [0.20, 0.58, 0.70],
     [0.55, 0.10, 0.28],
 ];
-const WHITE: Color = [0.95, 0.95, 0.93];
-const BLACK: Color = [0.10, 0.10, 0.11];
+pub(super) const WHITE: Color = [0.95, 0.95, 0.93];
+pub(super) const BLACK: Color = [0.10, 0.10, 0.11];
 
 /// One of the printing colours.
 pub fn ink(rng: &mut Rng) -> Color {
@@ -37,7 +37,7 @@ pub fn word(canvas: &mut Canvas, x: f32, y: f32, width: f32, color: Color, rng: 
 }
 
 /// Lines of words like print, `line` high each.
-fn paragraph(canvas: &mut Canvas, area: [f32; 4], line: f32, color: Color, rng: &mut Rng) {
+pub(super) fn paragraph(canvas: &mut Canvas, area: [f32; 4], line: f32, color: Color, rng: &mut Rng) {
     let [x, y, w, h] = area;
     let rows = (h / line) as usize;
     for row in 0..rows {
@@ -52,7 +52,7 @@ fn paragraph(canvas: &mut Canvas, area: [f32; 4], line: f32, color: Color, rng: 
 }
 
 /// A picture within an area: mosaic, landscape, chart, rings or a network.
-fn picture(canvas: &mut Canvas, area: [f32; 4], rng: &mut Rng) {
+pub(super) fn picture(canvas: &mut Canvas, area: [f32; 4], rng: &mut Rng) {
     let [x, y, w, h] = area;
     let seed = rng.bits();
     let (a, b, c) = (ink(rng), ink(rng), ink(rng));
@@ -185,11 +185,8 @@ pub(super) fn spine(canvas: &mut Canvas, color: Color, rng: &mut Rng) {
 pub(super) fn cardboard(canvas: &mut Canvas, m: f32, seed: u64, rng: &mut Rng) {
     let (w, h) = (canvas.width() as f32, canvas.height() as f32);
     let brown = [0.66, 0.50, 0.34];
-    canvas.shade(|x, y, _| {
-        let cloud = fractal(seed, x * m * 5.0, y * m * 5.0, 4) - 0.5;
-        let flute = fractal(seed ^ 1, x * m * 160.0, y * m * 12.0, 2) - 0.5;
-        tint(brown, 1.0 + 0.22 * cloud + 0.10 * flute)
-    });
+    let fields = [canvas.field(seed, [5.0 * m; 2], 4), canvas.field(seed ^ 1, [160.0 * m, 12.0 * m], 2)];
+    canvas.shade_with(fields, |_, _, _, [cloud, flute]| tint(brown, 1.0 + 0.22 * (cloud - 0.5) + 0.10 * (flute - 0.5)));
     canvas.rect(0.46 * w, 0.0, 0.08 * w, h, [0.74, 0.62, 0.42]);
     let (x, y) = (rng.range(0.05, 0.3) * w, rng.range(0.1, 0.3) * h);
     canvas.rect(x, y, 0.36 * w, 0.36 * h, WHITE);
@@ -208,7 +205,8 @@ pub(super) fn screen(canvas: &mut Canvas, rng: &mut Rng) {
     let (w, h) = (canvas.width() as f32, canvas.height() as f32);
     let ground = tint(rng.pick([INKS[1], INKS[2], INKS[4]]), 0.7);
     let seed = rng.bits();
-    canvas.shade(|x, y, _| tint(ground, 0.7 + 0.6 * noise::fractal(seed, x / w * 3.0, y / h * 3.0, 4)));
+    let cloud = canvas.field(seed, [3.0 / w, 3.0 / h], 4);
+    canvas.shade_with([cloud], |_, _, _, [cloud]| tint(ground, 0.7 + 0.6 * cloud));
     for window in 0..3 {
         let (ww, wh) = (rng.range(0.38, 0.52) * w, rng.range(0.45, 0.75) * h);
         let x = (0.03 + 0.27 * window as f32) * w;
@@ -244,7 +242,8 @@ pub(super) fn keyboard(canvas: &mut Canvas, rng: &mut Rng) {
 pub(super) fn whiteboard(canvas: &mut Canvas, m: f32, rng: &mut Rng) {
     let (w, h) = (canvas.width() as f32, canvas.height() as f32);
     let seed = rng.bits();
-    canvas.shade(|x, y, _| tint(WHITE, 0.94 + 0.08 * (fractal(seed, x * m * 4.0, y * m * 4.0, 3) - 0.5)));
+    let smear = canvas.field(seed, [4.0 * m; 2], 3);
+    canvas.shade_with([smear], |_, _, _, [smear]| tint(WHITE, 0.94 + 0.08 * (smear - 0.5)));
     let pens = [[0.10, 0.15, 0.45], [0.60, 0.12, 0.12], [0.08, 0.35, 0.18], BLACK];
     for row in 0..3 {
         for column in 0..4 {

@@ -102,6 +102,13 @@ impl FrameFeatures {
         self.index();
     }
 
+    /// Features that were taken apart, put together again; `descriptors[i]` is that of `features[i]`.
+    pub fn from_parts(features: Vec<Feature>, descriptors: Vec<Descriptor>, bounds: ImageBounds) -> Self {
+        let mut whole = Self { features, descriptors, bounds, ..Default::default() };
+        whole.index();
+        whole
+    }
+
     /// Number of features.
     pub fn len(&self) -> usize {
         self.features.len()

@@ -28,6 +28,8 @@ pub struct KeyFrame {
     pub parent: Option<KeyFrameId>,
     /// Children in the spanning tree, oldest first.
     pub children: Vec<KeyFrameId>,
+    /// Keyframes with which it closed a loop.
+    pub loop_edges: Vec<KeyFrameId>,
 }
 
 impl KeyFrame {

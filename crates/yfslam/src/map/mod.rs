@@ -6,10 +6,13 @@
 //! 3. A landmark has at least one observation.
 //! 4. The covisibility lists of two keyframes name each other with the same weight.
 //! 5. Every keyframe but the first has a parent in the map; parents form a tree.
+//! 6. Loop edges are mutual; a keyframe with one stays in the map.
 
 mod keyframe;
 mod landmark;
 pub mod ops;
+pub mod persist;
+mod restore;
 
 use std::collections::BTreeMap;
 

@@ -24,6 +24,7 @@ impl Map {
             covisible: Vec::new(),
             parent: None,
             children: Vec::new(),
+            loop_edges: Vec::new(),
         })
     }
 
@@ -215,10 +216,24 @@ impl Map {
         }
     }
 
-    /// Removes a keyframe with its observations; its children go to its parent. The first keyframe and those outside the spanning
-    /// tree stay: returns whether it was removed.
+    /// Notes that two keyframes closed a loop.
+    pub fn add_loop_edge(&mut self, a: KeyFrameId, b: KeyFrameId) {
+        if a == b || !self.keyframes.contains_key(a) || !self.keyframes.contains_key(b) {
+            return;
+        }
+        for (from, to) in [(a, b), (b, a)] {
+            let edges = &mut self.keyframes[from].loop_edges;
+            if !edges.contains(&to) {
+                edges.push(to);
+            }
+        }
+    }
+
+    /// Removes a keyframe with its observations; its children go to its parent. The first keyframe, those outside the spanning tree
+    /// and those that closed a loop stay: returns whether it was removed.
     pub fn remove_keyframe(&mut self, keyframe: KeyFrameId) -> bool {
-        let Some(parent) = self.keyframes.get(keyframe).and_then(|k| k.parent) else { return false };
+        let removable = self.keyframes.get(keyframe).filter(|k| k.loop_edges.is_empty());
+        let Some(parent) = removable.and_then(|k| k.parent) else { return false };
         let sights: Vec<LandmarkId> = self.keyframes[keyframe].sights().map(|(_, l)| l).collect();
         for landmark in sights {
             self.remove_observation(landmark, keyframe);
@@ -260,6 +275,9 @@ impl Map {
                 if back != Some(&(id, count)) {
                     return Err(format!("covisibility of {id:?} and {other:?} is not mutual"));
                 }
+            }
+            if k.loop_edges.iter().any(|e| self.keyframes.get(*e).is_none_or(|e| !e.loop_edges.contains(&id))) {
+                return Err(format!("a loop edge of {id:?} is not mutual"));
             }
             if k.parent.is_some_and(|p| self.keyframes.get(p).is_none_or(|p| !p.children.contains(&id))) {
                 return Err(format!("the parent of {id:?} does not list it as a child"));

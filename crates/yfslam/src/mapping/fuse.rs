@@ -44,7 +44,7 @@ fn neighbourhood(config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<KeyFra
 }
 
 /// Projects landmarks into `target`: a feature that fits gets the landmark, or its own is merged with it.
-fn fuse_into(sensor: &SensorModel, config: &Config, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
+pub fn fuse_into(sensor: &SensorModel, config: &Config, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
     let Some(k) = map.keyframe(target) else { return };
     let t_cam_world = k.t_cam_world;
     let projector = Projector::new(sensor, &t_cam_world);

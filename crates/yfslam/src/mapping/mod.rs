@@ -5,7 +5,7 @@
 
 mod cull;
 mod depth;
-mod fuse;
+pub(crate) mod fuse;
 mod triangulate;
 mod window;
 
@@ -35,15 +35,10 @@ impl Mapper {
     ) -> KeyFrameId {
         let keyframe = self.add_keyframe(sensor, config, map, frame, color);
         self.young = cull::young_landmarks(&config.mapping, map, keyframe, std::mem::take(&mut self.young));
-        if std::env::var("NOTRI").is_err() {
-            self.young.extend(triangulate::new_landmarks(sensor, config, map, keyframe, color));
-        }
-        if std::env::var("NOFUSE").is_err() {
-            fuse::duplicates(sensor, config, map, keyframe);
-        }
+        self.young.extend(triangulate::new_landmarks(sensor, config, map, keyframe, color));
+        fuse::duplicates(sensor, config, map, keyframe);
         map.update_covisibility(keyframe);
         if map.keyframe_count() > 2
-            && std::env::var("NOBA").is_err()
             && let Some(mut window) = Window::copy(sensor, &config.mapping, map, keyframe)
         {
             window.adjust(&config.bundle);

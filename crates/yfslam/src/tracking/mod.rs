@@ -1,7 +1,7 @@
 //! The pose of each frame, from its trusted features and the map (ORB-SLAM2, IEEE T-RO 2017, section III).
 //!
 //! In: a frame's features with trust. Out: its pose and matches, and whether it should become a keyframe.
-//! The tracker reads the map; only the visibility counts of landmarks are written.
+//! The tracker only reads the map; what it saw of it is noted in [`Sightings`].
 
 mod frame;
 pub mod keyframe_policy;
@@ -30,6 +30,23 @@ pub enum TrackingState {
     Lost,
 }
 
+/// Landmarks that frames should have seen, and those that they saw; one may stand there more than once.
+#[derive(Clone, Debug, Default)]
+pub struct Sightings {
+    /// In view.
+    pub visible: Vec<LandmarkId>,
+    /// Found, and fitting the pose.
+    pub found: Vec<LandmarkId>,
+}
+
+impl Sightings {
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.visible.clear();
+        self.found.clear();
+    }
+}
+
 /// Follows the camera from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub struct Tracker {
@@ -43,6 +60,8 @@ pub struct Tracker {
     rotation: RotationHistogram,
     reference: Option<KeyFrameId>,
     frames_since_keyframe: u64,
+    /// What was seen since the map's owner took note.
+    pub sightings: Sightings,
     /// Landmarks that the current frame sees.
     pub inliers: usize,
 }
@@ -99,8 +118,9 @@ impl Tracker {
             && self.current.refine_pose(sensor, &config.pose) >= c.motion_min_inliers
     }
 
-    /// Matches the local map and refines the pose with all of it. Returns whether the frame is tracked.
-    pub fn track_local_map(&mut self, sensor: &SensorModel, config: &Config, map: &mut Map) -> bool {
+    /// Matches the local map and refines the pose with all of it. Returns whether the frame is tracked: at least `min_inliers`
+    /// landmarks fit.
+    pub fn track_local_map(&mut self, sensor: &SensorModel, config: &Config, map: &Map, min_inliers: usize) -> bool {
         let c = &config.tracking;
         for sight in &mut self.current.sights {
             // Borrowed points have done their work: the refined pose rests on the map alone.
@@ -117,16 +137,10 @@ impl Tracker {
         }
         self.visible.sort_unstable();
         self.visible.dedup();
-        for &id in &self.visible {
-            map.count_visible(id);
-        }
+        self.sightings.visible.extend_from_slice(&self.visible);
         self.inliers = self.current.refine_pose(sensor, &config.pose);
-        for sight in self.current.sights.iter().flatten() {
-            if let Some(id) = sight.landmark {
-                map.count_found(id);
-            }
-        }
-        self.inliers >= c.local_min_inliers
+        self.sightings.found.extend(self.current.sights.iter().flatten().filter_map(|sight| sight.landmark));
+        self.inliers >= min_inliers
     }
 
     /// Ends a tracked frame: ties it to its reference and learns the motion.
@@ -154,10 +168,19 @@ impl Tracker {
         is_keyframe_wanted(&config.keyframes, &config.tracking, sensor, map, reference, &self.current, summary)
     }
 
+    /// Notes that the current frame was handed over to become a keyframe.
+    pub fn offered_keyframe(&mut self) {
+        self.frames_since_keyframe = 0;
+    }
+
+    /// Notes that an earlier frame became a keyframe.
+    pub fn gained_keyframe(&mut self, keyframe: KeyFrameId) {
+        self.reference = Some(keyframe);
+    }
+
     /// Notes that the current frame became a keyframe, and takes the pose and matches that mapping gave it.
     pub fn became_keyframe(&mut self, keyframe: KeyFrameId, map: &Map) {
         self.reference = Some(keyframe);
-        self.frames_since_keyframe = 0;
         let Some(k) = map.keyframe(keyframe) else { return };
         self.current.t_cam_world = k.t_cam_world;
         self.current.reference = Some((keyframe, Pose::identity()));
@@ -172,6 +195,7 @@ impl Tracker {
         self.velocity = None;
         self.reference = None;
         self.frames_since_keyframe = 0;
+        self.sightings.clear();
         self.inliers = 0;
         self.last.reference = None;
         self.current.reference = None;

@@ -1,9 +1,13 @@
 //! The whole path from a frame to its pose, on one page.
 
+mod errors;
+
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::backend::{Backend, Execution, Inserted, MapOwner};
 use crate::camera::Camera;
-use crate::config::{Config, ConfigError};
+use crate::config::Config;
 use crate::detection::{Detection, Detector};
 use crate::detector_thread::DetectorThread;
 use crate::dynamic::{DynamicFilter, Method, Region};
@@ -11,10 +15,12 @@ use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
 use crate::image::{GrayImage, gray_from_rgb};
+use crate::loops::{LoopClosed, relocalise};
+use crate::map::persist::{MapError, SavedMap, encode};
 use crate::map::{KeyFrameId, Map};
-use crate::mapping::Mapper;
 use crate::sensor::SensorModel;
 use crate::tracking::{TrackedFrame, Tracker, TrackingState};
+pub use errors::{FrameRejected, SetupError};
 
 /// What became of one frame.
 #[derive(Clone, Debug)]
@@ -25,62 +31,14 @@ pub struct Tracked {
     pub state: TrackingState,
     /// Pose of the camera in the world as known now; `None` unless tracking.
     pub t_world_cam: Option<Pose>,
-    /// Whether the frame became a keyframe.
+    /// Whether the frame became a keyframe, or was handed over to become one.
     pub is_keyframe: bool,
     /// Landmarks that fit the pose.
     pub inliers: usize,
+    /// The loop that a keyframe closed, this one or, if mapping has a thread of its own, an earlier one: all poses may have changed.
+    pub loop_closed: Option<LoopClosed>,
     /// Where the time went.
     pub times: StageTimes,
-}
-
-/// Why a system could not be set up.
-#[derive(Debug, thiserror::Error)]
-pub enum SetupError {
-    /// A movable class that the detector does not know.
-    #[error("dynamic.movable names the class '{name}', which the detector does not know; it knows: {known}")]
-    UnknownClass {
-        /// The class asked for.
-        name: String,
-        /// The classes the detector has.
-        known: String,
-    },
-    /// A value of the configuration with which nothing can work.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// A thread could not be started.
-    #[error("the detector's thread could not be started: {0}")]
-    Thread(#[from] std::io::Error),
-}
-
-/// A frame that cannot be used. The system goes on with the next one as if this one had not come.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum FrameRejected {
-    /// The images do not fit the camera.
-    #[error(
-        "the {image} image is {width}x{height}, the camera {camera_width}x{camera_height}: give the calibration of this size"
-    )]
-    Size {
-        /// Which image: colour or depth.
-        image: &'static str,
-        /// Its width, px.
-        width: usize,
-        /// Its height, px.
-        height: usize,
-        /// The camera's width, px.
-        camera_width: usize,
-        /// The camera's height, px.
-        camera_height: usize,
-    },
-    /// The clock did not advance.
-    #[error(
-        "the time stamp {timestamp_ns} ns does not come after {last_ns} ns, that of the last frame: the frame is repeated or late"
-    )]
-    Time {
-        /// Stamp of the frame, ns.
-        timestamp_ns: i64,
-        /// Stamp of the frame before, ns.
-        last_ns: i64,
-    },
 }
 
 /// Wall time of the stages of one frame.
@@ -94,8 +52,19 @@ pub struct StageTimes {
     pub dynamic: Duration,
     /// Pose from last frame and local map.
     pub tracking: Duration,
-    /// Keyframe insertion and local bundle adjustment; zero for frames that are no keyframe.
+    /// Keyframe insertion and local bundle adjustment, where it became known; zero for most frames.
     pub mapping: Duration,
+    /// Place recognition: loops for keyframes, the way back for frames that are lost.
+    pub places: Duration,
+}
+
+/// What becomes of a map from an earlier session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapUse {
+    /// It grows and is refined, once the camera has recognised where it is.
+    Extend,
+    /// It stays as it is; the camera is localised in it.
+    Localise,
 }
 
 /// Where a tracked frame hangs in the map.
@@ -108,14 +77,14 @@ struct Anchor {
 
 /// RGB-D SLAM: frames in, poses out.
 pub struct Slam {
-    config: Config,
-    sensor: SensorModel,
+    config: Arc<Config>,
+    sensor: Arc<SensorModel>,
     extractor: OrbExtractor,
     gray: GrayImage,
     extracted: Features,
     tracker: Tracker,
-    mapper: Mapper,
-    map: Map,
+    owner: MapOwner,
+    execution: Execution,
     state: TrackingState,
     anchors: Vec<Anchor>,
     filter: DynamicFilter,
@@ -126,6 +95,12 @@ pub struct Slam {
     detector_failures: usize,
     last_timestamp_ns: Option<i64>,
     resets: usize,
+    /// Frames that were worth keeping when mapping was busy.
+    passed_over: usize,
+    /// How a map from an earlier session is used; `None` if the map is all of this one.
+    map_use: Option<MapUse>,
+    /// Sequence number of the first keyframe of this session.
+    first_keyframe: u64,
 }
 
 impl Slam {
@@ -136,6 +111,9 @@ impl Slam {
     pub fn new(config: Config, camera: &Camera, detector: Option<Box<dyn Detector>>) -> Result<Self, SetupError> {
         config.validate()?;
         let extractor = OrbExtractor::new(&config.features);
+        let sensor = Arc::new(SensorModel::new(camera, &config, extractor.scale_factors()));
+        let config = Arc::new(config);
+        let backend = Backend::new(sensor.clone(), config.clone(), Map::default());
         // A method that asks for no boxes needs no detector.
         let detector = detector.filter(|_| config.dynamic.method != Method::None);
         let mut movable_classes = Vec::new();
@@ -158,17 +136,56 @@ impl Slam {
             detector_failures: 0,
             last_timestamp_ns: None,
             resets: 0,
-            sensor: SensorModel::new(camera, &config, extractor.scale_factors()),
+            passed_over: 0,
+            map_use: None,
+            first_keyframe: 0,
+            owner: MapOwner::new(backend, Execution::Inline)?,
+            execution: Execution::Inline,
+            sensor,
             config,
             extractor,
             gray: GrayImage::default(),
             extracted: Features::default(),
             tracker: Tracker::default(),
-            mapper: Mapper::default(),
-            map: Map::default(),
             state: TrackingState::NotInitialized,
             anchors: Vec::new(),
         })
+    }
+
+    /// The system with mapping and loop closing where `execution` says; the map, if any, is begun anew.
+    ///
+    /// # Errors
+    /// If a thread cannot be started.
+    pub fn with_execution(mut self, execution: Execution) -> Result<Self, SetupError> {
+        let backend = Backend::new(self.sensor.clone(), self.config.clone(), Map::default());
+        self.owner = MapOwner::new(backend, execution)?;
+        self.execution = execution;
+        Ok(self)
+    }
+
+    /// The system in a map from an earlier session: lost, until a frame is recognised.
+    ///
+    /// # Errors
+    /// If the map's features were found with other settings, or it is to be extended with another camera.
+    pub fn with_map(mut self, saved: SavedMap, map_use: MapUse) -> Result<Self, SetupError> {
+        let (found, wanted) = (&saved.features, &self.config.features);
+        if (found.levels, found.scale_factor) != (wanted.levels, wanted.scale_factor) {
+            return Err(SetupError::MapFeatures {
+                found: found.levels,
+                found_scale: found.scale_factor,
+                wanted: wanted.levels,
+                wanted_scale: wanted.scale_factor,
+            });
+        }
+        if map_use == MapUse::Extend && saved.camera != self.sensor.camera {
+            return Err(SetupError::MapCamera(saved.camera.width, saved.camera.fx));
+        }
+        self.first_keyframe = saved.map.keyframes_ever();
+        let backend = Backend::new(self.sensor.clone(), self.config.clone(), saved.map);
+        self.owner = MapOwner::new(backend, self.execution)?;
+        self.map_use = Some(map_use);
+        self.state = TrackingState::Lost;
+        Ok(self)
     }
 
     /// Takes one frame through all stages.
@@ -188,30 +205,46 @@ impl Slam {
         let scales = &self.sensor.scale_factors;
         self.filter.before_pose(&self.config.dynamic, &self.movable, &frame.depth, features, scales);
         times.dynamic = clock.lap();
+        let mut loop_closed = None;
+        if let Some(inserted) = self.owner.poll() {
+            self.tracker.gained_keyframe(inserted.keyframe);
+            loop_closed = times.note(&inserted);
+        }
         let tracked = match self.state {
             TrackingState::NotInitialized => self.has_enough_to_start(),
-            TrackingState::Tracking | TrackingState::Lost => {
-                self.tracker.estimate(&self.sensor, &self.config, &self.map)
-                    && self.tracker.track_local_map(&self.sensor, &self.config, &mut self.map)
+            TrackingState::Tracking => {
+                let min_inliers = self.config.tracking.local_min_inliers;
+                let map = self.owner.map();
+                self.tracker.estimate(&self.sensor, &self.config, map)
+                    && self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers)
+            }
+            TrackingState::Lost => {
+                let found = self.find_again();
+                times.places += clock.lap();
+                // Whoever was lost has to be surer than whoever was not.
+                let min_inliers = self.config.places.relocalise_min_inliers;
+                found && self.tracker.track_local_map(&self.sensor, &self.config, self.owner.map(), min_inliers)
             }
         };
+        self.owner.note(&mut self.tracker.sightings);
         if tracked {
-            self.tracker.accept(&self.map);
+            self.tracker.accept(self.owner.map());
         } else {
             self.tracker.reject();
         }
         times.tracking = clock.lap();
-        let is_keyframe = tracked && self.tracker.wants_keyframe(&self.sensor, &self.config, &self.map);
+        let is_keyframe = tracked && self.wants_keyframe();
         if is_keyframe {
-            let current = &self.tracker.current;
-            let keyframe = self.mapper.insert(&self.sensor, &self.config, &mut self.map, current, &frame.color);
-            self.tracker.became_keyframe(keyframe, &self.map);
-            times.mapping = clock.lap();
+            self.tracker.offered_keyframe();
+            if let Some(inserted) = self.owner.insert(&self.tracker.current, &frame.color) {
+                self.tracker.became_keyframe(inserted.keyframe, self.owner.map());
+                loop_closed = times.note(&inserted);
+            }
         }
         self.state = match (tracked, self.state) {
             (true, _) => TrackingState::Tracking,
             (false, TrackingState::NotInitialized) => TrackingState::NotInitialized,
-            (false, _) if self.map.keyframe_count() <= self.config.tracking.reset_max_keyframes => self.reset(),
+            (false, _) if self.is_map_worthless() => self.reset(),
             (false, _) => TrackingState::Lost,
         };
         self.note_anchor(frame.timestamp_ns);
@@ -221,6 +254,7 @@ impl Slam {
             t_world_cam: tracked.then(|| self.tracker.current.t_cam_world.inverse()),
             is_keyframe,
             inliers: self.tracker.inliers,
+            loop_closed,
             times,
         })
     }
@@ -300,14 +334,38 @@ impl Slam {
             && with_depth >= self.config.tracking.init_min_landmarks
     }
 
-    /// Throws the map away and starts over with the next frame: a map this young is worth less than a fresh start (ORB-SLAM2). The poses
-    /// that hung on it go with it.
+    /// Seeks the frame of a camera that was lost in the whole map.
+    fn find_again(&mut self) -> bool {
+        let recogniser = self.owner.recogniser();
+        let mut recogniser = recogniser.lock().unwrap_or_else(PoisonError::into_inner);
+        relocalise(&mut recogniser, &self.sensor, &self.config, self.owner.map(), &mut self.tracker.current)
+    }
+
+    /// Whether the frame is to become a keyframe, and can.
+    fn wants_keyframe(&mut self) -> bool {
+        let frozen = self.map_use == Some(MapUse::Localise);
+        if frozen || !self.tracker.wants_keyframe(&self.sensor, &self.config, self.owner.map()) {
+            return false;
+        }
+        let free = self.owner.is_free();
+        self.passed_over += usize::from(!free);
+        free
+    }
+
+    /// Whether a fresh start is worth more than the map (ORB-SLAM2): it is young, and all of this session.
+    fn is_map_worthless(&self) -> bool {
+        self.map_use.is_none() && self.owner.map().keyframe_count() <= self.config.tracking.reset_max_keyframes
+    }
+
+    /// Throws the map away and starts over with the next frame. The poses that hung on it go with it.
     fn reset(&mut self) -> TrackingState {
-        tracing::warn!(keyframes = self.map.keyframe_count(), "lost soon after the start: the map is begun anew");
-        self.map = Map::default();
+        tracing::warn!(
+            keyframes = self.owner.map().keyframe_count(),
+            "lost soon after the start: the map is begun anew"
+        );
+        self.owner.reset();
         self.anchors.clear();
         self.tracker.reset();
-        self.mapper.reset();
         self.resets += 1;
         TrackingState::NotInitialized
     }
@@ -320,12 +378,23 @@ impl Slam {
         }
     }
 
+    /// Waits for mapping that is under way on its own thread, so that [`Slam::map`] and [`Slam::trajectory`] tell all. Returns the loop
+    /// that it closed.
+    pub fn settle(&mut self) -> Option<LoopClosed> {
+        self.owner.settle()?.loop_closed
+    }
+
+    /// Frames that were worth a keyframe while mapping was busy on its own thread.
+    pub fn passed_over(&self) -> usize {
+        self.passed_over
+    }
+
     /// Poses of all tracked frames (world from camera) as the map has them now.
     pub fn trajectory(&self) -> Vec<(i64, Pose)> {
         self.anchors
             .iter()
             .filter_map(|a| {
-                let t_cam_world = a.t_cam_reference * self.map.keyframe_pose(a.reference)?;
+                let t_cam_world = a.t_cam_reference * self.owner.map().keyframe_pose(a.reference)?;
                 Some((a.timestamp_ns, t_cam_world.inverse()))
             })
             .collect()
@@ -356,9 +425,31 @@ impl Slam {
         self.filter.regions()
     }
 
-    /// The map.
+    /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
+    pub fn first_keyframe(&self) -> u64 {
+        self.first_keyframe
+    }
+
+    /// The map as bytes, for [`crate::map::persist::decode`].
+    ///
+    /// # Errors
+    /// If it cannot be written, which would be a fault of this program.
+    pub fn save_map(&self) -> Result<Vec<u8>, MapError> {
+        encode(self.map(), &self.sensor.camera, &self.config.features)
+    }
+
+    /// The map: with mapping on its own thread, as it was after the last keyframe that is finished.
     pub fn map(&self) -> &Map {
-        &self.map
+        self.owner.map()
+    }
+}
+
+impl StageTimes {
+    /// Adds what a keyframe took; returns the loop that it closed.
+    fn note(&mut self, inserted: &Inserted) -> Option<LoopClosed> {
+        self.mapping += inserted.mapping;
+        self.places += inserted.places;
+        inserted.loop_closed
     }
 }
 

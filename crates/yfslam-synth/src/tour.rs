@@ -1,0 +1,183 @@
+//! A round through a place, on wheels or on foot, with the camera looking ahead.
+//!
+//! In: way-points on the floor and a pace. Out: the camera's pose at any time. The corners of the round are averaged
+//! away, the pace drops where it would turn too fast, and the result, sampled evenly in time, is read through a uniform
+//! cubic B-spline (de Boor, "A practical guide to splines", 1978): position, velocity and acceleration are continuous.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::camera_path::look_at;
+
+/// How a round is done.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// Slowest and fastest speed on a straight, m/s.
+    pub speed: [f64; 2],
+    /// Fastest turn, rad/s.
+    pub turn: f64,
+    /// Height of the camera, m.
+    pub height: f64,
+    /// Downward tilt of the camera as a slope.
+    pub tilt: f64,
+    /// Spread of the average that rounds the corners, m.
+    pub rounding: f64,
+}
+
+/// A closed round with a time-table.
+#[derive(Clone, Debug)]
+pub struct Tour {
+    /// x, y, and the direction of view (cosine, sine) every [`TICK_S`] or a little less, for one round.
+    ticks: Vec<[f64; 4]>,
+    tick: f64,
+    pace: Pace,
+}
+
+/// Distance between points of the way, m.
+const SPACING_M: f64 = 0.02;
+/// Greatest time between two points of the time-table, s.
+const TICK_S: f64 = 0.1;
+/// One looks from a little behind oneself to a place ahead, m: people and robots look into a bend.
+const LOOK_M: [f64; 2] = [-0.3, 0.9];
+
+impl Tour {
+    /// A round through `corners` that takes `seconds` if the pace allows it, else as near as it does.
+    pub fn new(corners: &[[f64; 2]], pace: Pace, seconds: f64) -> Self {
+        let way = rounded(corners, pace.rounding);
+        let looks = looks(&way);
+        let count = way.len();
+        let lengths: Vec<f64> = (0..count).map(|i| distance(way[i], way[(i + 1) % count])).collect();
+        let bends: Vec<f64> = (0..count).map(|i| angle_between(looks[i], looks[(i + 1) % count])).collect();
+        let times = |top: f64| -> Vec<f64> {
+            let speeds: Vec<f64> =
+                lengths.iter().zip(&bends).map(|(l, a)| top.min(pace.turn * l / a.max(1e-9))).collect();
+            // The slowest of a neighbourhood, averaged over it: never faster than allowed, never an abrupt brake.
+            let reach = ((0.8 / SPACING_M) as usize).min(count / 4);
+            let slowest: Vec<f64> = (0..count)
+                .map(|i| (0..=2 * reach).map(|k| speeds[(i + count + k - reach) % count]).fold(top, f64::min))
+                .collect();
+            let smooth = averaged(&slowest.iter().map(|&v| [v]).collect::<Vec<_>>(), 2 * reach + 1);
+            lengths.iter().zip(smooth).map(|(l, [v])| l / v).collect()
+        };
+        let [mut low, mut high] = pace.speed;
+        for _ in 0..20 {
+            let middle = 0.5 * (low + high);
+            if times(middle).iter().sum::<f64>() > seconds { low = middle } else { high = middle }
+        }
+        let steps = times(high);
+        let period: f64 = steps.iter().sum();
+        let ticks = (period / TICK_S).ceil().max(4.0);
+        let tick = period / ticks;
+        let (mut at, mut i) = (0.0, 0);
+        let ticks = (0..ticks as usize).map(|k| {
+            let time = k as f64 * tick;
+            while i + 1 < count && at + steps[i] <= time {
+                at += steps[i];
+                i += 1;
+            }
+            let t = ((time - at) / steps[i]).min(1.0);
+            let blend = |a: [f64; 2], b: [f64; 2]| [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
+            let ([x, y], [c, s]) = (blend(way[i], way[(i + 1) % count]), blend(looks[i], looks[(i + 1) % count]));
+            [x, y, c, s]
+        });
+        Self { ticks: ticks.collect(), tick, pace }
+    }
+
+    /// World from camera at `time` seconds.
+    pub fn pose(&self, time: f64) -> Isometry3<f64> {
+        let ticks = (time / self.tick).rem_euclid(self.ticks.len() as f64);
+        let (k, t) = (ticks as usize, ticks.fract());
+        let weights = [
+            (1.0 - t).powi(3) / 6.0,
+            (3.0 * t.powi(3) - 6.0 * t * t + 4.0) / 6.0,
+            (-3.0 * t.powi(3) + 3.0 * t * t + 3.0 * t + 1.0) / 6.0,
+            t.powi(3) / 6.0,
+        ];
+        let n = self.ticks.len();
+        let [x, y, c, s] = std::array::from_fn(|axis| {
+            weights.iter().enumerate().map(|(i, w)| w * self.ticks[(k + n + i - 1) % n][axis]).sum::<f64>()
+        });
+        let eye = Point3::new(x, y, self.pace.height);
+        let ahead = Vector3::new(c, s, 0.0).normalize();
+        look_at(eye, eye + ahead - Vector3::z() * self.pace.tilt)
+    }
+}
+
+/// Points along the closed polygon, evenly spaced, averaged three times so that corners become bends.
+fn rounded(corners: &[[f64; 2]], rounding: f64) -> Vec<[f64; 2]> {
+    let sides = corners.iter().zip(corners.iter().cycle().skip(1));
+    let mut points = Vec::new();
+    for (a, b) in sides {
+        let steps = (distance(*a, *b) / SPACING_M).ceil().max(1.0);
+        points.extend((0..steps as usize).map(|i| {
+            let t = i as f64 / steps;
+            [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t]
+        }));
+    }
+    // Three boxes of width w have a spread of w / 2.
+    let width = ((2.0 * rounding / SPACING_M) as usize).min(points.len() / 4) | 1;
+    (0..3).fold(points, |points, _| averaged(&points, width))
+}
+
+/// Averages over `width` (odd) neighbours on a circle.
+fn averaged<const N: usize>(values: &[[f64; N]], width: usize) -> Vec<[f64; N]> {
+    let count = values.len();
+    let mean = |i: usize| {
+        let window = (0..width).map(|k| values[(i + count + k - width / 2) % count]);
+        window.fold([0.0; N], |sum, v| std::array::from_fn(|axis| sum[axis] + v[axis] / width as f64))
+    };
+    (0..count).map(mean).collect()
+}
+
+/// Unit direction of view at every point of the way.
+fn looks(way: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let count = way.len();
+    let at = |i: usize, metres: f64| way[(i as i64 + (metres / SPACING_M) as i64).rem_euclid(count as i64) as usize];
+    let chord = |i: usize| {
+        let (from, to) = (at(i, LOOK_M[0]), at(i, LOOK_M[1]));
+        let length = distance(from, to).max(1e-9);
+        [(to[0] - from[0]) / length, (to[1] - from[1]) / length]
+    };
+    (0..count).map(chord).collect()
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+fn angle_between(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] * b[1] - a[1] * b[0]).abs().asin()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PACE: Pace = Pace { speed: [0.3, 1.2], turn: 0.7, height: 1.4, tilt: 0.05, rounding: 1.0 };
+    const CORNERS: [[f64; 2]; 5] = [[0.0, 0.0], [0.0, 6.0], [10.0, 6.0], [10.0, -4.0], [0.0, -4.0]];
+
+    fn period(tour: &Tour) -> f64 {
+        tour.tick * tour.ticks.len() as f64
+    }
+
+    #[test]
+    fn a_round_takes_the_time_given_unless_that_would_be_too_fast() {
+        assert!((period(&Tour::new(&CORNERS, PACE, 60.0)) - 60.0).abs() < 0.1);
+        let rushed = period(&Tour::new(&CORNERS, PACE, 10.0));
+        assert!((31.0..38.0).contains(&rushed), "40 m with rounded corners in {rushed} s");
+        let patient = period(&Tour::new(&CORNERS, PACE, 1000.0));
+        assert!((110.0..135.0).contains(&patient), "{patient} s");
+    }
+
+    #[test]
+    fn speed_and_turning_stay_within_the_pace() {
+        let tour = Tour::new(&CORNERS, PACE, 10.0);
+        let h = 0.01;
+        let poses: Vec<_> = (0..(period(&tour) / h) as usize).map(|i| tour.pose(i as f64 * h)).collect();
+        for pair in poses.windows(2) {
+            let speed = (pair[1].translation.vector - pair[0].translation.vector).norm() / h;
+            let turn = pair[0].rotation.angle_to(&pair[1].rotation) / h;
+            assert!((0.3..1.21).contains(&speed), "{speed} m/s");
+            assert!(turn < 0.72, "{turn} rad/s");
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! What a loop changes in the map (ORB-SLAM, IEEE T-RO 2015, section VII): the near side moves to where the far side says it is,
+//! duplicates are joined, the error is spread over the way between them, and everything is adjusted.
+//!
+//! In: a keyframe located among the landmarks of an old place. Out: a corrected map.
+
+use slotmap::SecondaryMap;
+
+use super::recognise::Candidate;
+use crate::config::Config;
+use crate::geometry::Pose;
+use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::mapping::{Window, fuse};
+use crate::optimize::pose_graph::{Edge, PoseGraph};
+use crate::sensor::SensorModel;
+use crate::tracking::TrackedFrame;
+
+/// The two sides of a loop, and all poses as they were.
+struct Loop {
+    /// The keyframe that came back, and its covisible ones.
+    near: Vec<KeyFrameId>,
+    /// Poses before the correction, `t_cam_world`.
+    before: SecondaryMap<KeyFrameId, Pose>,
+    /// Poses of the near side as the far side has them.
+    moved: SecondaryMap<KeyFrameId, Pose>,
+    /// Landmarks that moved with a keyframe of the near side.
+    carried: SecondaryMap<LandmarkId, KeyFrameId>,
+    /// Pairs of a near and a far keyframe that came to share landmarks.
+    links: Vec<(KeyFrameId, KeyFrameId)>,
+}
+
+/// Closes the loop between `keyframe` and the place of `candidate`, in which it was located as `located`.
+pub fn close(
+    sensor: &SensorModel,
+    config: &Config,
+    map: &mut Map,
+    keyframe: KeyFrameId,
+    candidate: &Candidate,
+    located: &TrackedFrame,
+) {
+    let Some(mut ends) = Loop::new(map, keyframe, &located.t_cam_world) else { return };
+    ends.move_near_side(map);
+    ends.join(sensor, config, map, keyframe, candidate, located);
+    map.add_loop_edge(keyframe, candidate.keyframe);
+    ends.spread(sensor, config, map);
+    let mut whole = Window::whole(sensor, map);
+    whole.adjust(&config.bundle);
+    whole.merge(sensor, map);
+}
+
+impl Loop {
+    fn new(map: &Map, keyframe: KeyFrameId, t_cam_world: &Pose) -> Option<Self> {
+        let k = map.keyframe(keyframe)?;
+        let near: Vec<KeyFrameId> = std::iter::once(keyframe).chain(k.covisible.iter().map(|(id, _)| *id)).collect();
+        let correction = k.t_cam_world.inverse() * t_cam_world;
+        let before: SecondaryMap<KeyFrameId, Pose> = map.keyframes().map(|(id, k)| (id, k.t_cam_world)).collect();
+        let moved = near.iter().filter_map(|id| Some((*id, *before.get(*id)? * correction))).collect();
+        Some(Self { near, before, moved, carried: SecondaryMap::new(), links: Vec::new() })
+    }
+
+    /// Moves the keyframes of the near side, rigidly, with all landmarks they see.
+    fn move_near_side(&mut self, map: &mut Map) {
+        for &id in &self.near {
+            let (Some(&old), Some(&new)) = (self.before.get(id), self.moved.get(id)) else { continue };
+            let Some(keyframe) = map.keyframe(id) else { continue };
+            let seen: Vec<LandmarkId> = keyframe.sights().map(|(_, l)| l).collect();
+            for landmark in seen {
+                let Some(position) = map.landmark(landmark).map(|l| l.position) else { continue };
+                if self.carried.insert(landmark, id).is_none() {
+                    map.set_position(landmark, new.inverse() * (old * position));
+                }
+            }
+            map.set_pose(id, new);
+        }
+    }
+
+    /// Joins what both sides see, and notes which keyframes that connects.
+    fn join(
+        &mut self,
+        sensor: &SensorModel,
+        config: &Config,
+        map: &mut Map,
+        keyframe: KeyFrameId,
+        candidate: &Candidate,
+        located: &TrackedFrame,
+    ) {
+        for (feature, sight) in located.sights.iter().enumerate() {
+            let Some(far) = sight.and_then(|s| s.landmark) else { continue };
+            match map.keyframe(keyframe).and_then(|k| k.landmarks.get(feature).copied()) {
+                Some(Some(near)) => map.merge_landmarks(far, near),
+                Some(None) => map.add_observation(far, keyframe, feature),
+                None => {}
+            }
+        }
+        let far_side = candidate.group.iter().filter(|id| !self.near.contains(id)).filter_map(|id| map.keyframe(*id));
+        let mut far: Vec<LandmarkId> = far_side.flat_map(|k| k.sights().map(|(_, l)| l)).collect();
+        far.sort_unstable();
+        far.dedup();
+        for &target in &self.near {
+            fuse::fuse_into(sensor, config, map, target, &far);
+        }
+        for &id in &self.near {
+            let neighbours = |map: &Map| -> Vec<KeyFrameId> {
+                map.keyframe(id).map(|k| k.covisible.iter().map(|(id, _)| *id).collect()).unwrap_or_default()
+            };
+            let old = neighbours(map);
+            map.update_covisibility(id);
+            let new = neighbours(map).into_iter().filter(|other| !old.contains(other) && !self.near.contains(other));
+            self.links.extend(new.map(|other| (id, other)));
+        }
+        self.links.push((keyframe, candidate.keyframe));
+        self.links.sort_unstable();
+        self.links.dedup();
+    }
+
+    /// Spreads the error over the essential graph: the spanning tree, all loops, and strong covisibility.
+    fn spread(&self, sensor: &SensorModel, config: &Config, map: &mut Map) {
+        // In the order of time the equations are nearly a band. The first keyframe, which defines the world, stays.
+        let mut order: Vec<(u64, KeyFrameId)> = map.keyframes().map(|(id, k)| (k.sequence, id)).collect();
+        order.sort_unstable();
+        let index: SecondaryMap<KeyFrameId, usize> = order.iter().enumerate().map(|(i, (_, id))| (*id, i)).collect();
+        let base = |id: KeyFrameId| self.moved.get(id).or(self.before.get(id)).copied();
+        let is_link = |a, b| self.links.binary_search(&(a, b)).is_ok() || self.links.binary_search(&(b, a)).is_ok();
+        let mut graph = PoseGraph::default();
+        for &(_, a) in &order {
+            let (Some(keyframe), Some(pose)) = (map.keyframe(a), base(a)) else { continue };
+            graph.poses.push(pose);
+            let strong = keyframe.covisible.iter().filter(|(_, weight)| *weight >= config.loops.strong_weight);
+            let mut others: Vec<KeyFrameId> = strong.map(|(id, _)| *id).collect();
+            others.extend(keyframe.parent.iter().chain(&keyframe.loop_edges));
+            others.sort_unstable();
+            others.dedup();
+            for b in others {
+                // Each pair once, from its later member; links are the new measurements, the rest keeps its shape.
+                let (Some(&i), Some(&j)) = (index.get(a), index.get(b)) else { continue };
+                let pose_of = |id| if is_link(a, b) { base(id) } else { self.before.get(id).copied() };
+                if let (true, Some(t_a), Some(t_b)) = (i > j || keyframe.parent == Some(b), pose_of(a), pose_of(b)) {
+                    graph.edges.push(Edge { a: i, b: j, t_a_b: t_a * t_b.inverse() });
+                }
+            }
+        }
+        graph.solve(&config.pose_graph);
+        let landmarks: Vec<LandmarkId> = map.landmarks().map(|(id, _)| id).collect();
+        for id in landmarks {
+            let Some(landmark) = map.landmark(id) else { continue };
+            let anchor = self.carried.get(id).copied().unwrap_or(landmark.reference);
+            let (Some(base), Some(&i)) = (base(anchor), index.get(anchor)) else { continue };
+            let position = graph.poses[i].inverse() * (base * landmark.position);
+            map.set_position(id, position);
+            map.update_landmark(id, &sensor.scale_factors);
+        }
+        for ((_, id), pose) in order.iter().zip(&graph.poses) {
+            map.set_pose(*id, *pose);
+        }
+    }
+}

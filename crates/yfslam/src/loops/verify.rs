@@ -1,0 +1,126 @@
+//! Where the camera stands in a place that was recognised: P3P in RANSAC (Fischler and Bolles, 1981), then a guided search, as ORB-SLAM
+//! relocalises (IEEE T-RO 2015, section V-C).
+//!
+//! In: a frame and a candidate. Out: the frame's pose and matches, or the verdict that it is not there.
+
+use nalgebra::{Point3, Vector3};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+
+use super::recognise::Candidate;
+use crate::config::{Config, PlaceConfig};
+use crate::geometry::{Pose, p3p};
+use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::optimize::residual::Measurement;
+use crate::sensor::SensorModel;
+use crate::tracking::search::search_local_map;
+use crate::tracking::{Sight, TrackedFrame};
+
+/// Locates `frame` in the place of `candidate`. Returns the number of landmarks that fit the pose; pose and matches are then those of the
+/// frame. `None` if fewer than `min_inliers` fit.
+pub fn locate(
+    sensor: &SensorModel,
+    config: &Config,
+    map: &Map,
+    candidate: &Candidate,
+    frame: &mut TrackedFrame,
+    min_inliers: usize,
+) -> Option<usize> {
+    let c = &config.places;
+    let pairs: Vec<Pair> = candidate.matches.iter().filter_map(|m| Pair::new(sensor, map, frame, *m)).collect();
+    let pose = ransac(sensor, c, &pairs)?;
+    frame.clear_sights();
+    frame.t_cam_world = pose;
+    for pair in pairs.iter().filter(|pair| pair.fits(sensor, &pose)) {
+        frame.sights[pair.feature] = Some(Sight { landmark: Some(pair.landmark), point_world: pair.point_world });
+    }
+    let mut inliers = frame.refine_pose(sensor, &config.pose);
+    let mut visible = Vec::new();
+    // The second search starts from a better pose.
+    for _ in 0..2 {
+        if inliers < c.min_refined_inliers {
+            return None;
+        }
+        let landmarks = unmatched_landmarks(map, &candidate.group, frame);
+        search_local_map(sensor, &config.tracking, map, &landmarks, frame, &mut visible);
+        inliers = frame.refine_pose(sensor, &config.pose);
+    }
+    (inliers >= min_inliers).then_some(inliers)
+}
+
+/// Landmarks that the keyframes see and the frame is not matched to.
+fn unmatched_landmarks(map: &Map, keyframes: &[KeyFrameId], frame: &TrackedFrame) -> Vec<LandmarkId> {
+    let mut matched: Vec<LandmarkId> = frame.sights.iter().flatten().filter_map(|s| s.landmark).collect();
+    matched.sort_unstable();
+    let mut landmarks: Vec<LandmarkId> =
+        keyframes.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.sights().map(|(_, l)| l)).collect();
+    landmarks.sort_unstable();
+    landmarks.dedup();
+    landmarks.retain(|id| matched.binary_search(id).is_err());
+    landmarks
+}
+
+/// A feature and the landmark it may show.
+struct Pair {
+    feature: usize,
+    landmark: LandmarkId,
+    point_world: Point3<f64>,
+    measurement: Measurement,
+    /// Direction in which the feature is seen, unit length.
+    ray: Vector3<f64>,
+}
+
+impl Pair {
+    fn new(sensor: &SensorModel, map: &Map, frame: &TrackedFrame, (feature, id): (u32, LandmarkId)) -> Option<Self> {
+        let (f, landmark) = (frame.features.features.get(feature as usize)?, map.landmark(id)?);
+        Some(Self {
+            feature: feature as usize,
+            landmark: id,
+            point_world: landmark.position,
+            measurement: sensor.measurement(f),
+            ray: sensor.pinhole.unproject(f64::from(f.u), f64::from(f.v), 1.0).coords.normalize(),
+        })
+    }
+
+    fn fits(&self, sensor: &SensorModel, t_cam_world: &Pose) -> bool {
+        let p = (t_cam_world * self.point_world).coords;
+        let m = &self.measurement;
+        p.z > 1e-3 && m.chi2(&m.residual(&sensor.pinhole, &p)) <= m.chi2_limit()
+    }
+}
+
+/// The pose that most pairs fit, if enough do. Draws end when a better pose has become unlikely.
+fn ransac(sensor: &SensorModel, config: &PlaceConfig, pairs: &[Pair]) -> Option<Pose> {
+    let count = pairs.len();
+    if count < config.min_ransac_inliers.max(3) {
+        return None;
+    }
+    // Seeded anew for each call: a result depends on its input alone.
+    let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
+    let mut draw = || ((u64::from(rng.next_u32()) * count as u64) >> 32) as usize;
+    let mut best: Option<(usize, Pose)> = None;
+    let mut draws = config.max_draws as f64;
+    let mut drawn = 0;
+    while f64::from(drawn) < draws {
+        drawn += 1;
+        let [a, b, c] = [draw(), draw(), draw()];
+        if a == b || a == c || b == c {
+            continue;
+        }
+        let sample = [&pairs[a], &pairs[b], &pairs[c]];
+        for pose in p3p(&sample.map(|pair| pair.point_world), &sample.map(|pair| pair.ray)) {
+            // Depth, where measured, tells the true one of the solutions.
+            if !sample.iter().all(|pair| pair.fits(sensor, &pose)) {
+                continue;
+            }
+            let inliers = pairs.iter().filter(|pair| pair.fits(sensor, &pose)).count();
+            if best.is_none_or(|(most, _)| inliers > most) {
+                best = Some((inliers, pose));
+                let share = inliers as f64 / count as f64;
+                let needed = (1.0 - config.confidence).ln() / (1.0 - share.powi(3)).max(1e-9).ln();
+                draws = draws.min(needed.ceil().max(1.0));
+            }
+        }
+    }
+    best.filter(|(inliers, _)| *inliers >= config.min_ransac_inliers).map(|(_, pose)| pose)
+}

@@ -1,0 +1,50 @@
+//! Putting a saved map together again. Unlike [`super::ops`], these set what is otherwise counted.
+
+use crate::features::FrameFeatures;
+use crate::geometry::Pose;
+use crate::map::{KeyFrameId, LandmarkId, Map};
+
+impl Map {
+    /// A keyframe with the sequence number that it had; see [`Map::insert_keyframe`].
+    pub(super) fn restore_keyframe(
+        &mut self,
+        timestamp_ns: i64,
+        sequence: u64,
+        t_cam_world: Pose,
+        features: FrameFeatures,
+    ) -> KeyFrameId {
+        let id = self.insert_keyframe(timestamp_ns, t_cam_world, features);
+        self.keyframes[id].sequence = sequence;
+        id
+    }
+
+    /// How many keyframes there ever were: more than the last one's sequence number.
+    pub(super) fn restore_count(&mut self, keyframes_ever: u64) -> Result<(), String> {
+        let mut sequences: Vec<u64> = self.keyframes.values().map(|k| k.sequence).collect();
+        sequences.sort_unstable();
+        if sequences.windows(2).any(|pair| pair[0] == pair[1]) || sequences.last().is_some_and(|s| *s >= keyframes_ever)
+        {
+            return Err(format!("{} keyframes do not have different numbers below {keyframes_ever}", sequences.len()));
+        }
+        self.keyframes_ever = keyframes_ever;
+        Ok(())
+    }
+
+    /// The parent of a keyframe in the spanning tree, which is older: so nobody is its own ancestor.
+    pub(super) fn restore_parent(&mut self, child: KeyFrameId, parent: KeyFrameId) -> Result<(), String> {
+        let (young, old) = (self.keyframes[child].sequence, self.keyframes[parent].sequence);
+        if young <= old {
+            return Err(format!("keyframe {young} has the younger keyframe {old} as its parent"));
+        }
+        self.keyframes[child].parent = Some(parent);
+        self.keyframes[parent].children.push(child);
+        Ok(())
+    }
+
+    /// What a landmark went through.
+    pub(super) fn restore_history(&mut self, id: LandmarkId, born: u64, visible: u32, found: u32) {
+        if let Some(l) = self.landmarks.get_mut(id) {
+            (l.born, l.visible, l.found) = (born, visible, found);
+        }
+    }
+}

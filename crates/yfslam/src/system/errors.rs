@@ -1,0 +1,73 @@
+//! What can be wrong with a setup or a frame.
+
+use crate::config::ConfigError;
+
+/// Why a system could not be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupError {
+    /// A movable class that the detector does not know.
+    #[error("dynamic.movable names the class '{name}', which the detector does not know; it knows: {known}")]
+    UnknownClass {
+        /// The class asked for.
+        name: String,
+        /// The classes the detector has.
+        known: String,
+    },
+    /// A value of the configuration with which nothing can work.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A map made with other feature settings.
+    #[error(
+        "the map was made with {found} pyramid levels of scale {found_scale}, the configuration has {wanted} of {wanted_scale}: \
+         set features.levels and features.scale_factor to the map's"
+    )]
+    MapFeatures {
+        /// Levels of the map's features.
+        found: usize,
+        /// Their scale factor.
+        found_scale: f32,
+        /// Levels configured.
+        wanted: usize,
+        /// Scale factor configured.
+        wanted_scale: f32,
+    },
+    /// A map made with another camera, which can be localised in but not extended.
+    #[error(
+        "the map was made with another camera ({0} px wide, fx {1}): use its calibration, or localise in the map instead of extending it"
+    )]
+    MapCamera(usize, f64),
+    /// A thread could not be started.
+    #[error("the detector's thread could not be started: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// A frame that cannot be used. The system goes on with the next one as if this one had not come.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FrameRejected {
+    /// The images do not fit the camera.
+    #[error(
+        "the {image} image is {width}x{height}, the camera {camera_width}x{camera_height}: give the calibration of this size"
+    )]
+    Size {
+        /// Which image: colour or depth.
+        image: &'static str,
+        /// Its width, px.
+        width: usize,
+        /// Its height, px.
+        height: usize,
+        /// The camera's width, px.
+        camera_width: usize,
+        /// The camera's height, px.
+        camera_height: usize,
+    },
+    /// The clock did not advance.
+    #[error(
+        "the time stamp {timestamp_ns} ns does not come after {last_ns} ns, that of the last frame: the frame is repeated or late"
+    )]
+    Time {
+        /// Stamp of the frame, ns.
+        timestamp_ns: i64,
+        /// Stamp of the frame before, ns.
+        last_ns: i64,
+    },
+}
