@@ -11,6 +11,8 @@ use yfslam::image::RgbImage;
 use yfslam::{Config, Detection, Detector, DetectorError};
 use yfslam_detect::{DetectorConfig, YoloFastestV2};
 
+use crate::cpu;
+
 /// Which network finds people.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "System")]
@@ -39,9 +41,17 @@ pub struct ModelIdentity {
 /// A detector ready to run.
 pub struct LoadedDetector {
     pub detector: Box<dyn Detector>,
-    /// One duration for each image it has seen.
-    pub times: Receiver<Duration>,
+    /// One for each image it has seen.
+    pub times: Receiver<Took>,
     pub identity: ModelIdentity,
+}
+
+/// How long one image took.
+#[derive(Clone, Copy, Debug)]
+pub struct Took {
+    pub wall: Duration,
+    /// Processor time; `None` where the system does not tell.
+    pub cpu: Option<Duration>,
 }
 
 /// Loads a YOLO-FastestV2 model, set to report every box that the dynamic filter of `config` may use.
@@ -74,7 +84,7 @@ pub fn load(args: &DetectorArgs, file: &Path, config: &Config) -> Result<LoadedD
 /// Tells how long each image took.
 struct Timed {
     network: YoloFastestV2,
-    times: Sender<Duration>,
+    times: Sender<Took>,
 }
 
 impl Detector for Timed {
@@ -84,9 +94,9 @@ impl Detector for Timed {
 
     fn detect(&mut self, image: &RgbImage, out: &mut Vec<Detection>) -> Result<(), DetectorError> {
         let started = Instant::now();
-        let result = self.network.detect(image, out);
+        let (result, cpu) = cpu::timed(|| self.network.detect(image, out));
         // Whoever stopped listening does not need the time.
-        let _ = self.times.send(started.elapsed());
+        let _ = self.times.send(Took { wall: started.elapsed(), cpu });
         result
     }
 }

@@ -1,6 +1,6 @@
 //! Pictures of what the dynamic filter decided, in the manner of the YF-SLAM paper's Fig. 7.
 //!
-//! In: a frame and the system that has just seen it. Out: `overlay/000123.png`.
+//! In: a frame and the system that has just seen it. Out: its picture, and `overlay/000123.png`.
 
 use std::path::{Path, PathBuf};
 
@@ -47,26 +47,32 @@ impl Overlay {
     /// # Errors
     /// The file cannot be written.
     pub fn write(&self, index: usize, frame: &RgbdFrame, slam: &Slam) -> Result<()> {
-        let mut image = RgbImage::clone(&frame.color);
-        for region in slam.moving_regions() {
-            tint_region(&mut image, region, &frame.depth);
-        }
-        for detection in slam.last_boxes() {
-            outline(&mut image, &detection.bbox, if detection.score >= self.open_score { BOX } else { WEAK_BOX });
-        }
-        for region in slam.moving_regions() {
-            outline(&mut image, &region.bbox, DYNAMIC);
-        }
-        let seen = slam.last_frame();
-        for (feature, sight) in seen.features.features.iter().zip(&seen.sights) {
-            match sight {
-                _ if feature.trust <= 0.0 => disc(&mut image, feature.raw, 2.0, DYNAMIC),
-                Some(_) => ring(&mut image, feature.raw, 1.5, 2.5, STATIC),
-                None => disc(&mut image, feature.raw, 1.0, UNMATCHED),
-            }
-        }
+        let image = picture(frame, slam, self.open_score);
         Ok(write_color_png(&self.folder.join(format!("{index:06}.png")), &image)?)
     }
+}
+
+/// The picture of the frame that `slam` saw last; boxes from `open_score` on open a track.
+pub fn picture(frame: &RgbdFrame, slam: &Slam, open_score: f32) -> RgbImage {
+    let mut image = RgbImage::clone(&frame.color);
+    for region in slam.moving_regions() {
+        tint_region(&mut image, region, &frame.depth);
+    }
+    for detection in slam.last_boxes() {
+        outline(&mut image, &detection.bbox, if detection.score >= open_score { BOX } else { WEAK_BOX });
+    }
+    for region in slam.moving_regions() {
+        outline(&mut image, &region.bbox, DYNAMIC);
+    }
+    let seen = slam.last_frame();
+    for (feature, sight) in seen.features.features.iter().zip(&seen.sights) {
+        match sight {
+            _ if feature.trust <= 0.0 => disc(&mut image, feature.raw, 2.0, DYNAMIC),
+            Some(_) => ring(&mut image, feature.raw, 1.5, 2.5, STATIC),
+            None => disc(&mut image, feature.raw, 1.0, UNMATCHED),
+        }
+    }
+    image
 }
 
 /// Whether a file name is one that [`Overlay::write`] gives.

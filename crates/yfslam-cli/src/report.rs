@@ -45,6 +45,8 @@ pub struct Report<'a> {
     pub times: &'a Stages,
     pub wall_s: f64,
     pub fps: f64,
+    /// Processor time of tracking and detection, without reading or rendering; `null` where the system does not tell.
+    pub cpu_s: Option<f64>,
     /// Peak resident memory, MB (10⁶ bytes); `null` where the system does not tell.
     pub peak_memory_mb: Option<f64>,
     /// Errors against the ground truth, if there is one.
@@ -105,6 +107,7 @@ impl<'a> Report<'a> {
             times: &outcome.stages,
             wall_s: outcome.wall.as_secs_f64(),
             fps: outcome.fps(),
+            cpu_s: outcome.cpu.map(|cpu| cpu.as_secs_f64()),
             peak_memory_mb: peak_memory_mb(),
             groundtruth: truth.map(|truth| truth.origin.as_str()),
             evaluation,

@@ -27,7 +27,7 @@ pub struct SettingsArgs {
 }
 
 /// How moving things are kept out.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
     /// Every feature is trusted, as in ORB-SLAM2.
     None,
@@ -46,6 +46,26 @@ pub enum GroupingArg {
     Ransac,
 }
 
+impl MethodArg {
+    /// The method that is meant.
+    pub fn method(self) -> Method {
+        match self {
+            Self::None => Method::None,
+            Self::Boxes => Method::Boxes,
+            Self::Yf => Method::Yf,
+        }
+    }
+}
+
+/// Name of a method, as on the command line, and what it does.
+pub fn describe(method: Method) -> (&'static str, &'static str) {
+    match method {
+        Method::None => ("none", "every feature is trusted"),
+        Method::Boxes => ("boxes", "features in boxes of people are dropped"),
+        Method::Yf => ("yf", "people are kept out, what is behind them stays"),
+    }
+}
+
 impl SettingsArgs {
     /// The configuration that file and flags amount to.
     ///
@@ -62,12 +82,7 @@ impl SettingsArgs {
             None => Config::default(),
         };
         let dynamic = &mut config.dynamic;
-        match self.method {
-            Some(MethodArg::None) => dynamic.method = Method::None,
-            Some(MethodArg::Boxes) => dynamic.method = Method::Boxes,
-            Some(MethodArg::Yf) => dynamic.method = Method::Yf,
-            None => {}
-        }
+        dynamic.method = self.method.map_or(dynamic.method, MethodArg::method);
         match self.grouping {
             Some(GroupingArg::Exact) => dynamic.grouping = Grouping::Exact,
             Some(GroupingArg::Ransac) => dynamic.grouping = Grouping::Ransac,

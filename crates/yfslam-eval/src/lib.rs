@@ -16,6 +16,7 @@ mod coverage;
 mod error;
 mod evaluate;
 mod pose;
+pub mod report;
 mod rpe;
 mod statistics;
 mod table;

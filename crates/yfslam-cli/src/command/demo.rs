@@ -2,26 +2,33 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::{Args, value_parser};
 use yfslam::Config;
 use yfslam::dynamic::Method;
 use yfslam_eval::{EvalOptions, Evaluation, ExpectedFrames, Table, TableStyle, improvement_percent};
 
 use crate::accuracy::{judge, to_eval};
+use crate::html;
+use crate::moments::Moments;
 use crate::output::OutputFolder;
-use crate::pipeline::{Outcome, Pipeline};
+use crate::pipeline::{Outcome, Pipeline, Stages};
 use crate::progress::Progress;
 use crate::report::{BoxSource, Report, Run};
-use crate::source::SourceArgs;
-use crate::terminal::Terminal;
+use crate::settings::{MethodArg, describe};
+use crate::source::{Source, SourceArgs};
+use crate::terminal::{Terminal, explain};
 
 const EXAMPLES: &str = "\
 Examples:
   yfslam demo
   yfslam demo --frames 60 --out /tmp/demo
+  yfslam demo --methods none,yf --seed 7
 
-In the output folder, `none/` and `yf/` hold what `yfslam run` leaves behind.";
+In the output folder, `report.html` shows it all; `none/`, `boxes/` and `yf/` hold what `yfslam run` leaves behind.";
+
+/// Evenly spread moments of which the report has a picture for every method.
+const MOMENTS: usize = 3;
 
 /// Render people who walk around a desk, track the camera without and with the dynamic filter, and compare.
 ///
@@ -29,6 +36,9 @@ In the output folder, `none/` and `yf/` hold what `yfslam run` leaves behind.";
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct DemoArgs {
+    /// Which methods; the others are compared with the first.
+    #[arg(long, value_enum, value_name = "METHOD,METHOD", value_delimiter = ',', default_value = "none,boxes,yf")]
+    methods: Vec<MethodArg>,
     /// Number of frames.
     #[arg(long, value_name = "N", default_value_t = 150, value_parser = value_parser!(u32).range(3..=1_000_000))]
     frames: u32,
@@ -40,8 +50,20 @@ pub struct DemoArgs {
     out: Option<PathBuf>,
 }
 
-/// The two that are compared.
-const METHODS: [(&str, Method); 2] = [("none", Method::None), ("yf", Method::Yf)];
+/// One of those that are compared, at work.
+struct Contender {
+    config: Config,
+    pipeline: Pipeline,
+    moments: Moments,
+}
+
+/// One of those that are compared, when it is done.
+struct Judged {
+    config: Config,
+    outcome: Outcome,
+    evaluation: Option<Evaluation>,
+    moments: Moments,
+}
 
 pub fn run(args: &DemoArgs, terminal: Terminal) -> Result<()> {
     // Four people who cover half of the picture: as crowded as the hardest sequences that people record.
@@ -49,69 +71,116 @@ pub fn run(args: &DemoArgs, terminal: Terminal) -> Result<()> {
     let out = OutputFolder::prepare(args.out.as_deref(), "demo")?;
     terminal.note(&format!("rendering {spec}; the boxes of people come from the renderer, not from a network"));
     let mut source = SourceArgs::new(spec.clone()).open(true)?;
-    let configs = METHODS.map(|(_, method)| {
-        let mut config = Config::default();
-        config.dynamic.method = method;
-        config
-    });
-
-    let mut pipelines = Vec::new();
-    for config in &configs {
-        pipelines.push(Pipeline::new(config, &source.camera.camera, None)?);
-    }
-    let mut progress = Progress::new(terminal, "demo", source.stamps_ns.len());
-    let mut rendering = Default::default();
-    while let Some(frame) = source.frames.next(&mut rendering) {
-        // Rendered frames are always usable.
-        let Ok(frame) = frame else { continue };
-        for pipeline in &mut pipelines {
-            let state = pipeline.track(&frame);
-            progress.frame(pipeline.frames(), state);
-        }
-    }
-    progress.finish();
+    let mut contenders = contenders(args, &source)?;
+    let rendering = drive(&mut source, &mut contenders, terminal);
 
     let truth = source.truth_of_world();
-    let mut judged = Vec::new();
-    for ((pipeline, config), (name, method)) in pipelines.into_iter().zip(&configs).zip(METHODS) {
-        let outcome = pipeline.finish(config)?;
-        let expected = ExpectedFrames::StampsNs(source.stamps_ns.clone());
-        let options = EvalOptions { expected, ..Default::default() };
-        let poses = truth.as_ref().map_or(&[][..], |truth| &truth.poses);
-        let evaluation = judge(poses, &to_eval(&outcome.trajectory), options)?;
-        let folder = OutputFolder::prepare(Some(&out.path().join(name)), name)?;
-        folder.write(&outcome, config)?;
-        folder.write_report(&Report::new(&Run {
+    let poses = truth.as_ref().map_or(&[][..], |truth| &truth.poses);
+    let judged: Vec<Judged> = contenders.into_iter().filter_map(|c| c.finish(&source, poses, terminal)).collect();
+    if judged.is_empty() {
+        bail!("no method has a trajectory; give more --frames or another --seed");
+    }
+    let mut shown = Vec::new();
+    for Judged { config, outcome, evaluation, moments } in &judged {
+        let method = config.dynamic.method;
+        let run = Run {
             sequence: &spec,
             source: &source,
             boxes: if method == Method::None { BoxSource::None } else { BoxSource::Renderer },
             faults: &[],
-            outcome: &outcome,
+            outcome,
             truth: truth.as_ref(),
-            evaluation: Some(&evaluation),
+            evaluation: evaluation.as_ref(),
             config,
-        }))?;
-        judged.push((outcome, evaluation));
+        };
+        let (name, _) = describe(method);
+        let folder = OutputFolder::prepare(Some(&out.path().join(name)), name)?;
+        folder.write(outcome, config)?;
+        folder.write_report(&Report::new(&run))?;
+        shown.push(html::Shown { run, pictures: moments.to_pictures()? });
     }
-    if let [none, yf] = judged.as_slice() {
-        terminal.result(&text(none, yf))?;
+    let page = html::write(&out, shown, &rendering)?;
+    terminal.result(&text(&judged))?;
+    terminal.result(&format!("\nwritten to {}\nreport: {}\n", out.path().display(), page.display()))
+}
+
+fn contenders(args: &DemoArgs, source: &Source) -> Result<Vec<Contender>> {
+    let mut methods: Vec<Method> = Vec::new();
+    for method in args.methods.iter().map(|m| m.method()) {
+        if !methods.contains(&method) {
+            methods.push(method);
+        }
     }
-    terminal.result(&format!("\nwritten to {}\n", out.path().display()))
+    let contender = |method| {
+        let mut config = Config::default();
+        config.dynamic.method = method;
+        let pipeline = Pipeline::new(&config, &source.camera.camera, None)?;
+        let moments = Moments::new(source.stamps_ns.len(), MOMENTS, config.dynamic.open_score);
+        Ok(Contender { config, pipeline, moments })
+    };
+    methods.into_iter().map(contender).collect()
+}
+
+/// Takes each frame, rendered once, through all pipelines. Returns the times of rendering.
+fn drive(source: &mut Source, contenders: &mut [Contender], terminal: Terminal) -> Stages {
+    let mut progress = Progress::new(terminal, "demo", source.stamps_ns.len());
+    let mut rendering = Stages::default();
+    while let Some(frame) = source.frames.next(&mut rendering) {
+        // Rendered frames are always usable.
+        let Ok(frame) = frame else { continue };
+        for Contender { pipeline, moments, .. } in &mut *contenders {
+            let state = pipeline.track(&frame);
+            moments.see(pipeline.frames().total() - 1, &frame, pipeline.slam());
+            progress.frame(pipeline.frames(), state);
+        }
+    }
+    progress.finish();
+    rendering
+}
+
+impl Contender {
+    /// The result; `None` if there is no trajectory, having said so.
+    fn finish(self, source: &Source, truth: &[yfslam_eval::StampedPose], terminal: Terminal) -> Option<Judged> {
+        let Self { config, pipeline, moments } = self;
+        let (name, _) = describe(config.dynamic.method);
+        let outcome = match pipeline.finish(&config) {
+            Ok(outcome) => outcome,
+            Err(error) => {
+                terminal.warn(&format!("{name}: {}", explain(&error)));
+                return None;
+            }
+        };
+        let expected = ExpectedFrames::StampsNs(source.stamps_ns.clone());
+        let evaluation = judge(truth, &to_eval(&outcome.trajectory), EvalOptions { expected, ..Default::default() });
+        let evaluation = evaluation.inspect_err(|error| terminal.warn(&format!("{name}: no evaluation: {error}"))).ok();
+        Some(Judged { config, outcome, evaluation, moments })
+    }
 }
 
 /// The errors side by side, as in Table 2 of the paper.
-fn text(none: &(Outcome, Evaluation), yf: &(Outcome, Evaluation)) -> String {
-    let mut table = Table::new(["ATE (m)", "RMSE", "S.D.", "median", "max", "frames tracked"]);
-    for (name, (outcome, evaluation)) in [("none: all features", none), ("yf: people kept out", yf)] {
-        let s = evaluation.ate.translation_m;
-        let figures = [s.rmse, s.std, s.median, s.max].map(|v| format!("{v:.4}"));
+fn text(judged: &[Judged]) -> String {
+    let headers =
+        ["ATE (m)", "RMSE", "S.D.", "mean", "median", "max", "improve RMSE (%)", "S.D. (%)", "frames tracked"];
+    let mut table = Table::new(headers);
+    let original = judged.first().and_then(|first| first.evaluation.as_ref()).map(|e| e.ate.translation_m);
+    for (place, Judged { config, outcome, evaluation, .. }) in judged.iter().enumerate() {
+        let (name, summary) = describe(config.dynamic.method);
+        let errors = evaluation.as_ref().map(|e| e.ate.translation_m);
+        let figures = match errors {
+            Some(s) => [s.rmse, s.std, s.mean, s.median, s.max].map(|v| format!("{v:.4}")),
+            None => std::array::from_fn(|_| "-".to_owned()),
+        };
+        let improvement = match errors.zip(original) {
+            Some((ours, original)) if place > 0 => {
+                [(ours.rmse, original.rmse), (ours.std, original.std)].map(|(ours, original)| {
+                    improvement_percent(ours, original).map_or("-".to_owned(), |percent| format!("{percent:.2}"))
+                })
+            }
+            _ => Default::default(),
+        };
         let tracked = format!("{} of {}", outcome.frames.tracked, outcome.frames.total());
-        table.push([name.to_owned()].into_iter().chain(figures).chain([tracked]));
+        table.push([format!("{name}: {summary}")].into_iter().chain(figures).chain(improvement).chain([tracked]));
     }
-    let (n, y) = (none.1.ate.translation_m, yf.1.ate.translation_m);
-    let better = [(y.rmse, n.rmse), (y.std, n.std), (y.median, n.median), (y.max, n.max)]
-        .map(|(ours, original)| improvement_percent(ours, original).map_or("-".to_owned(), |v| format!("{v:.2}")));
-    table.push(["improvement (%)".to_owned()].into_iter().chain(better));
     format!(
         "walking_xyz, synthetic, exact ground truth, boxes from the renderer\n\n{}",
         table.render(TableStyle::Plain)

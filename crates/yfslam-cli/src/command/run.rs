@@ -11,9 +11,11 @@ use yfslam_eval::{EvalOptions, Evaluation, ExpectedFrames, TableStyle};
 
 use crate::accuracy::{MatchArgs, judge, to_eval};
 use crate::detector::{self, DetectorArgs, LoadedDetector};
+use crate::html;
+use crate::moments::Moments;
 use crate::output::OutputFolder;
 use crate::overlay::Overlay;
-use crate::pipeline::{Outcome, Pipeline};
+use crate::pipeline::{Outcome, Pipeline, Stages};
 use crate::progress::Progress;
 use crate::report::{BoxSource, Report, Run};
 use crate::settings::SettingsArgs;
@@ -25,7 +27,7 @@ Examples:
   yfslam run rgbd_bonn_crowd --camera bonn --detector yolo-fastestv2.onnx
   yfslam run rgbd_dataset_freiburg1_xyz --camera tum1 --method none
   yfslam run 'synth:walking_xyz?seed=7&frames=300' --out walk      no data needed
-  yfslam run DIR --start 100 --end 400 --reverse --overlay
+  yfslam run DIR --start 100 --end 400 --reverse --overlay --report
   yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
 
 In the output folder:
@@ -36,8 +38,12 @@ In the output folder:
   run.json        what was run, what became of the frames, times, errors
   config.toml     every setting of this run; give it to --config to repeat it
   overlay/        with --overlay, one picture a frame
+  report.html     with --report, all of it on one page: figures, pictures, tables
 
 Ends with success only if a trajectory was produced.";
+
+/// Evenly spread moments of which the report has a picture.
+const MOMENTS: usize = 5;
 
 /// Track a sequence: its trajectory, map and report go to a folder.
 #[derive(Args, Debug)]
@@ -55,6 +61,9 @@ pub struct RunArgs {
     /// Write a picture of each frame: boxes yellow, moving regions red, static features green, dynamic ones red.
     #[arg(long, help_heading = "Output")]
     overlay: bool,
+    /// Write `report.html`: errors, trajectory, pictures and times on one page that needs no network.
+    #[arg(long, help_heading = "Output")]
+    report: bool,
     /// True trajectory in TUM format to judge the result by [default: groundtruth.txt in the folder, if it is there]. The estimator
     /// never sees it.
     #[arg(long, value_name = "FILE", help_heading = "Evaluation")]
@@ -84,8 +93,9 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let truth = find_truth(args, &source, terminal)?;
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
     let pictures = args.overlay.then(|| Overlay::prepare(out.path(), config.dynamic.open_score)).transpose()?;
+    let mut moments = args.report.then(|| Moments::new(source.stamps_ns.len(), MOMENTS, config.dynamic.open_score));
     let mut pipeline = Pipeline::new(&config, &source.camera.camera, detector)?;
-    drive(&mut source, &mut pipeline, pictures.as_ref(), terminal)?;
+    drive(&mut source, &mut pipeline, pictures.as_ref(), moments.as_mut(), terminal)?;
     let outcome = pipeline.finish(&config)?;
 
     let evaluation = truth.as_ref().map(|truth| {
@@ -94,7 +104,7 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         judge(&truth.poses, &to_eval(&outcome.trajectory), options)
     });
     out.write(&outcome, &config)?;
-    let report = Report::new(&Run {
+    let run = Run {
         sequence: &args.source.sequence,
         source: &source,
         boxes,
@@ -103,11 +113,22 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         truth: truth.as_ref(),
         evaluation: evaluation.as_ref().and_then(|e| e.as_ref().ok()),
         config: &config,
-    });
+    };
+    let report = Report::new(&run);
     out.write_report(&report)?;
     terminal.result(&summary(&report, &source, &outcome)?)?;
-    let judged = show_accuracy(args, evaluation, terminal);
+    let page = match moments {
+        Some(moments) => {
+            let shown = html::Shown { run, pictures: moments.to_pictures()? };
+            Some(html::write(&out, vec![shown], &Stages::default())?)
+        }
+        None => None,
+    };
+    let judged = show_accuracy(args, evaluation.as_ref(), terminal);
     terminal.result(&format!("\nwritten to {}\n", out.path().display()))?;
+    if let Some(page) = page {
+        terminal.result(&format!("report: {}\n", page.display()))?;
+    }
     judged
 }
 
@@ -140,15 +161,25 @@ fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Opt
 }
 
 /// Takes all frames of the source through the pipeline.
-fn drive(source: &mut Source, pipeline: &mut Pipeline, pictures: Option<&Overlay>, terminal: Terminal) -> Result<()> {
+fn drive(
+    source: &mut Source,
+    pipeline: &mut Pipeline,
+    pictures: Option<&Overlay>,
+    mut moments: Option<&mut Moments>,
+    terminal: Terminal,
+) -> Result<()> {
     let mut progress = Progress::new(terminal, &source.name, source.stamps_ns.len());
     let mut state = Default::default();
     while let Some(frame) = source.frames.next(&mut pipeline.stages) {
         match frame {
             Ok(frame) => {
                 state = pipeline.track(&frame);
+                let index = pipeline.frames().total() - 1;
                 if let Some(pictures) = pictures {
-                    pictures.write(pipeline.frames().total() - 1, &frame, pipeline.slam())?;
+                    pictures.write(index, &frame, pipeline.slam())?;
+                }
+                if let Some(moments) = &mut moments {
+                    moments.see(index, &frame, pipeline.slam());
                 }
             }
             Err(skip) => pipeline.skip(skip),
@@ -209,7 +240,7 @@ fn summary(report: &Report, source: &Source, outcome: &Outcome) -> Result<String
 /// Prints the errors; that they cannot be computed is an error if they were asked for.
 fn show_accuracy(
     args: &RunArgs,
-    evaluation: Option<Result<Evaluation, yfslam_eval::EvalError>>,
+    evaluation: Option<&Result<Evaluation, yfslam_eval::EvalError>>,
     terminal: Terminal,
 ) -> Result<()> {
     match evaluation {
@@ -219,6 +250,6 @@ fn show_accuracy(
             terminal.warn(&format!("no evaluation: {error}"));
             Ok(())
         }
-        Some(Err(error)) => Err(error).context("the trajectory was written, but it cannot be judged"),
+        Some(Err(error)) => Err(error.clone()).context("the trajectory was written, but it cannot be judged"),
     }
 }

@@ -16,9 +16,10 @@ use yfslam_io::StampedPose;
 use yfslam_io::time::format_stamp;
 use yfslam_io::write::PlyPoint;
 
-use crate::detector::LoadedDetector;
+use crate::cpu;
+use crate::detector::{LoadedDetector, Took};
 use crate::source::Skip;
-pub use stages::Stages;
+pub use stages::{StageSummary, Stages};
 pub use tally::{DynamicTally, FrameTally};
 
 /// SLAM with a record of what happened.
@@ -30,7 +31,8 @@ pub struct Pipeline {
     dynamic: DynamicTally,
     live: Vec<StampedPose>,
     resets: usize,
-    detector_times: Option<Receiver<Duration>>,
+    detector_times: Option<Receiver<Took>>,
+    cpu: Option<Duration>,
     started: Instant,
     state: TrackingState,
     /// Most features, and most of them with depth, in a frame before the map began.
@@ -52,6 +54,8 @@ pub struct Outcome {
     pub stages: Stages,
     /// From the first frame to the last.
     pub wall: Duration,
+    /// Processor time of tracking and detection; `None` where the system does not tell.
+    pub cpu: Option<Duration>,
 }
 
 impl Pipeline {
@@ -67,6 +71,7 @@ impl Pipeline {
             live: Vec::new(),
             resets: 0,
             detector_times: times,
+            cpu: cpu::thread_time().map(|_| Duration::ZERO),
             started: Instant::now(),
             state: TrackingState::default(),
             best_start: (0, 0),
@@ -76,7 +81,9 @@ impl Pipeline {
     /// Takes one frame through SLAM; one that it refuses is counted as skipped. Returns the state after it.
     pub fn track(&mut self, frame: &RgbdFrame) -> TrackingState {
         let started = Instant::now();
-        let tracked = match self.slam.track(frame) {
+        let (result, cpu) = cpu::timed(|| self.slam.track(frame));
+        self.add_cpu(cpu);
+        let tracked = match result {
             Ok(tracked) => tracked,
             Err(rejected) => {
                 self.skip(Skip { reason: "refused by the tracker", message: rejected.to_string() });
@@ -130,10 +137,12 @@ impl Pipeline {
     fn note_times(&mut self, tracked: &Tracked) {
         let times = &tracked.times;
         self.stages.push("features", times.features);
-        if let Some(detector_times) = &self.detector_times {
-            for took in detector_times.try_iter() {
-                self.stages.push("detector", took);
-            }
+        let detections: Vec<_> = self.detector_times.iter().flat_map(Receiver::try_iter).collect();
+        for took in detections {
+            self.stages.push("detector", took.wall);
+            self.add_cpu(took.cpu);
+        }
+        if self.detector_times.is_some() {
             self.stages.push("detector wait", times.detector_wait);
         }
         self.stages.push("dynamic filter", times.dynamic);
@@ -141,6 +150,10 @@ impl Pipeline {
         if tracked.is_keyframe {
             self.stages.push("mapping", times.mapping);
         }
+    }
+
+    fn add_cpu(&mut self, took: Option<Duration>) {
+        self.cpu = self.cpu.zip(took).map(|(sum, took)| sum + took);
     }
 
     fn note_start(&mut self) {
@@ -173,6 +186,7 @@ impl Pipeline {
             dynamic: self.dynamic,
             stages: self.stages,
             wall,
+            cpu: self.cpu,
         })
     }
 

@@ -15,6 +15,7 @@ pub struct StageSummary {
     pub count: usize,
     pub median_ms: f64,
     pub p95_ms: f64,
+    pub p99_ms: f64,
     pub max_ms: f64,
 }
 
@@ -25,6 +26,11 @@ impl Stages {
             Some((_, durations)) => durations.push(took),
             None => self.0.push((stage, vec![took])),
         }
+    }
+
+    /// Duration of all runs of a stage together.
+    pub fn total(&self, stage: &str) -> Duration {
+        self.0.iter().filter(|(name, _)| *name == stage).flat_map(|(_, durations)| durations).sum()
     }
 
     /// Each stage with its figures.
@@ -41,7 +47,13 @@ impl StageSummary {
         let count = sorted.len();
         let rank = |share: f64| ((share * count as f64).ceil() as usize).saturating_sub(1);
         let ms = |index: usize| Some((sorted.get(index)?.as_secs_f64() * 1e6).round() / 1e3);
-        Some(Self { count, median_ms: ms(rank(0.5))?, p95_ms: ms(rank(0.95))?, max_ms: ms(count.checked_sub(1)?)? })
+        Some(Self {
+            count,
+            median_ms: ms(rank(0.5))?,
+            p95_ms: ms(rank(0.95))?,
+            p99_ms: ms(rank(0.99))?,
+            max_ms: ms(count.checked_sub(1)?)?,
+        })
     }
 }
 
@@ -67,8 +79,14 @@ mod tests {
         }
         stages.push("alone", Duration::from_micros(1500));
         let found: Vec<_> = stages.summaries().collect();
-        assert_eq!(found[0], ("late", StageSummary { count: 100, median_ms: 50.0, p95_ms: 95.0, max_ms: 100.0 }));
-        assert_eq!(found[1], ("alone", StageSummary { count: 1, median_ms: 1.5, p95_ms: 1.5, max_ms: 1.5 }));
+        assert_eq!(
+            found[0],
+            ("late", StageSummary { count: 100, median_ms: 50.0, p95_ms: 95.0, p99_ms: 99.0, max_ms: 100.0 })
+        );
+        assert_eq!(
+            found[1],
+            ("alone", StageSummary { count: 1, median_ms: 1.5, p95_ms: 1.5, p99_ms: 1.5, max_ms: 1.5 })
+        );
         assert_eq!(StageSummary::of(&[]), None);
     }
 }

@@ -1,0 +1,163 @@
+//! In: the range of what is to be drawn. Out: an axis: where values lie on it and which of them are labelled.
+
+/// How values are spread along an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scale {
+    /// Evenly.
+    Linear,
+    /// By their logarithm; for positive values.
+    Log,
+    /// Evenly up to a threshold on either side of zero, by their logarithm beyond.
+    SymLog(f64),
+}
+
+/// An axis of a figure.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// What it shows, with unit.
+    pub name: String,
+    /// How values are spread.
+    pub scale: Scale,
+    /// First and last position.
+    pub range: [f64; 2],
+    /// Positions with their labels, in order.
+    pub ticks: Vec<(f64, String)>,
+}
+
+impl Scale {
+    /// Where a value lies.
+    pub fn position(self, value: f64) -> f64 {
+        match self {
+            Self::Linear => value,
+            Self::Log => value.max(f64::MIN_POSITIVE).log10(),
+            Self::SymLog(threshold) => {
+                let size = value.abs() / threshold;
+                value.signum() * if size <= 1.0 { size } else { 1.0 + size.log10() }
+            }
+        }
+    }
+}
+
+impl Axis {
+    /// An even axis from `from` to `to` with about `count` labels; values are shown times `factor`, to change the unit.
+    pub fn linear(name: impl Into<String>, [from, to]: [f64; 2], count: usize, factor: f64) -> Self {
+        let step = nice_step((to - from) * factor / count.max(1) as f64);
+        let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+        let first = (from * factor / step).ceil();
+        let last = (to * factor / step).floor();
+        let label = |k: f64| {
+            let text = format!("{:.decimals$}", k * step);
+            // A range that starts a little below zero would give "-0".
+            (k * step / factor, if k == 0.0 { text.replace('-', "") } else { text.replace('-', "−") })
+        };
+        let ticks = (0..=(last - first).clamp(0.0, 100.0) as usize).map(|i| label(first + i as f64)).collect();
+        Self { name: name.into(), scale: Scale::Linear, range: [from, to], ticks }
+    }
+
+    /// A logarithmic axis of lengths in metres over whole decades that hold `from` to `to`.
+    pub fn log_lengths(name: impl Into<String>, [from, to]: [f64; 2]) -> Self {
+        let exponent = |value: f64| value.max(1e-9).log10();
+        let low = exponent(from).floor();
+        let high = exponent(to).ceil().max(low + 1.0);
+        let decades = (high - low) as i32;
+        let ticks = (0..=decades).map(|k| low + f64::from(k)).map(|e| (e, trimmed(&length(10f64.powf(e))))).collect();
+        Self { name: name.into(), scale: Scale::Log, range: [low, high], ticks }
+    }
+
+    /// An axis of angles in degrees to either side of zero, logarithmic beyond `threshold`, which is a power of ten.
+    pub fn symlog_degrees(name: impl Into<String>, limit: f64, threshold: f64) -> Self {
+        let scale = Scale::SymLog(threshold);
+        let decades = (limit / threshold).log10().ceil().max(1.0) as i32;
+        let powers = (0..=decades).map(|k| threshold * 10f64.powi(k));
+        let values: Vec<f64> = powers.filter(|v| *v <= limit).collect();
+        let signed = values.iter().rev().map(|v| -v).chain([0.0]).chain(values.iter().copied());
+        let ticks = signed.map(|v| (scale.position(v), format!("{v}").replace('-', "−"))).collect();
+        let end = scale.position(limit) + 0.1;
+        Self { name: name.into(), scale, range: [-end, end], ticks }
+    }
+
+    /// An axis of named groups, one a unit apart.
+    pub fn groups(names: &[&str]) -> Self {
+        let ticks = names.iter().enumerate().map(|(i, name)| (i as f64, (*name).to_owned())).collect();
+        Self { name: String::new(), scale: Scale::Linear, range: [-0.55, names.len() as f64 - 0.45], ticks }
+    }
+}
+
+/// Unit in which lengths up to `max_m` are easy to read, and how many of it a metre has.
+pub fn length_unit(max_m: f64) -> (&'static str, f64) {
+    match max_m {
+        m if m < 0.05 => ("mm", 1e3),
+        m if m < 1.0 => ("cm", 1e2),
+        _ => ("m", 1.0),
+    }
+}
+
+/// A length in metres as people say it, with three digits.
+pub fn length(m: f64) -> String {
+    match m {
+        m if m < 0.000_999_5 => format!("{} µm", short(m * 1e6)),
+        m if m < 0.009_995 => format!("{} mm", short(m * 1e3)),
+        m if m < 0.999_5 => format!("{} cm", short(m * 1e2)),
+        m => format!("{} m", short(m)),
+    }
+}
+
+/// Three significant digits.
+fn short(value: f64) -> String {
+    let decimals = match value {
+        v if v >= 99.95 => 0,
+        v if v >= 9.995 => 1,
+        _ => 2,
+    };
+    format!("{value:.decimals$}")
+}
+
+/// Without zeros behind the point.
+fn trimmed(length: &str) -> String {
+    let Some((number, unit)) = length.split_once(' ') else { return length.to_owned() };
+    let number = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number };
+    format!("{number} {unit}")
+}
+
+/// The 1, 2 or 5 times a power of ten that is next to `rough` or above.
+fn nice_step(rough: f64) -> f64 {
+    let rough = if rough.is_finite() && rough > 0.0 { rough } else { 1.0 };
+    let power = 10f64.powf(rough.log10().floor());
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= rough * 0.999).unwrap_or(10.0);
+    factor * power
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(axis: &Axis) -> Vec<&str> {
+        axis.ticks.iter().map(|(_, label)| label.as_str()).collect()
+    }
+
+    #[test]
+    fn even_axes_have_round_labels_inside_the_range() {
+        assert_eq!(labels(&Axis::linear("", [-0.3, 1.1], 4, 1.0)), ["0.0", "0.5", "1.0"]);
+        assert_eq!(labels(&Axis::linear("", [0.0, 0.0213], 4, 1e3)), ["0", "10", "20"]);
+        assert_eq!(labels(&Axis::linear("", [-20.0, 20.0], 4, 1.0)), ["−20", "−10", "0", "10", "20"]);
+        assert!(Axis::linear("", [0.0, 0.0], 4, 1.0).ticks.len() < 20);
+    }
+
+    #[test]
+    fn logarithmic_axes_name_lengths_in_their_own_unit() {
+        assert_eq!(labels(&Axis::log_lengths("", [0.0013, 0.8])), ["1 mm", "1 cm", "10 cm", "1 m"]);
+        assert_eq!(length(0.0156), "1.56 cm");
+        assert_eq!(length(0.041), "4.10 cm");
+        assert_eq!(length(0.999_6), "1.00 m");
+        assert_eq!(length(12.0), "12.0 m");
+        assert_eq!(length(0.000_12), "120 µm");
+    }
+
+    #[test]
+    fn angles_keep_their_sign_on_a_logarithmic_axis() {
+        let axis = Axis::symlog_degrees("", 170.0, 1.0);
+        assert_eq!(labels(&axis), ["−100", "−10", "−1", "0", "1", "10", "100"]);
+        assert_eq!(axis.scale.position(-10.0), -2.0);
+        assert_eq!(axis.scale.position(0.5), 0.5);
+    }
+}

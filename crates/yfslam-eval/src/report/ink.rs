@@ -1,0 +1,118 @@
+//! In: what is drawn. Out: its colour, on a light and on a dark page.
+//!
+//! Figures are drawn in the light colours; a rule of the page's style sheet for each of them puts the dark one in its place. So a figure
+//! that is cut out of the page still has its colours.
+
+use std::fmt::Write;
+
+/// Red, green, blue.
+pub type Rgb = [u8; 3];
+
+/// What a stroke or an area of a figure stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ink {
+    /// Text on axes.
+    Text,
+    /// The axes.
+    Axis,
+    /// Lines behind the data.
+    Grid,
+    /// The true trajectory.
+    Truth,
+    /// A method, by its place in [`METHODS`].
+    Method(usize),
+}
+
+/// Light and dark colours of methods; told apart with any kind of colour vision (the first three by luminance as well).
+const METHODS: [[Rgb; 2]; 6] = [
+    [[201, 79, 17], [255, 146, 76]],
+    [[118, 75, 205], [183, 155, 255]],
+    [[0, 133, 124], [45, 212, 191]],
+    [[29, 98, 196], [110, 168, 254]],
+    [[186, 40, 110], [244, 128, 180]],
+    [[110, 110, 20], [205, 205, 90]],
+];
+
+impl Ink {
+    /// The colour of a method: the same in every report for those that the program has, else by its place in this one.
+    pub fn method(name: &str, place: usize) -> Self {
+        Self::Method(match name {
+            "none" => 0,
+            "boxes" => 1,
+            "yf" => 2,
+            _ => 3 + place % (METHODS.len() - 3),
+        })
+    }
+
+    /// Colour on a light page.
+    pub fn light(self) -> Rgb {
+        self.colors()[0]
+    }
+
+    /// Name of the variable of the style sheet that holds the colour.
+    pub fn variable(self) -> String {
+        match self {
+            Self::Text => "--ink-text".into(),
+            Self::Axis => "--ink-axis".into(),
+            Self::Grid => "--ink-grid".into(),
+            Self::Truth => "--ink-truth".into(),
+            Self::Method(place) => format!("--ink-method-{place}"),
+        }
+    }
+
+    fn colors(self) -> [Rgb; 2] {
+        match self {
+            Self::Text => [[75, 85, 99], [176, 184, 196]],
+            Self::Axis => [[156, 163, 175], [90, 99, 112]],
+            Self::Grid => [[229, 231, 235], [44, 51, 61]],
+            Self::Truth => [[31, 41, 55], [229, 233, 240]],
+            Self::Method(place) => METHODS.get(place).copied().unwrap_or(METHODS[0]),
+        }
+    }
+
+    fn all() -> impl Iterator<Item = Self> {
+        [Self::Text, Self::Axis, Self::Grid, Self::Truth].into_iter().chain((0..METHODS.len()).map(Self::Method))
+    }
+}
+
+/// The part of the style sheet that defines all colours, and gives figures those of the page.
+pub fn style() -> String {
+    let (mut light, mut dark, mut figures) = (String::new(), String::new(), String::new());
+    for ink in Ink::all() {
+        let (variable, [on_light, on_dark]) = (ink.variable(), ink.colors().map(hex));
+        // Writing to a string does not fail.
+        let _ = write!(light, "{variable}:{on_light};");
+        let _ = write!(dark, "{variable}:{on_dark};");
+        let _ = writeln!(figures, "svg [stroke=\"{on_light}\"]{{stroke:var({variable})}}");
+        let _ = writeln!(figures, "svg [fill=\"{on_light}\"]{{fill:var({variable})}}");
+    }
+    format!(":root{{{light}}}\n@media screen and (prefers-color-scheme: dark){{:root{{{dark}}}}}\n{figures}")
+}
+
+/// As the drawing backend writes it, which the rules of the style sheet have to match.
+fn hex([r, g, b]: Rgb) -> String {
+    format!("#{r:02X}{g:02X}{b:02X}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_two_inks_share_a_colour_on_either_page() {
+        for page in 0..2 {
+            let mut colors: Vec<Rgb> = Ink::all().map(|ink| ink.colors()[page]).collect();
+            colors.sort_unstable();
+            let count = colors.len();
+            colors.dedup();
+            assert_eq!(colors.len(), count);
+        }
+    }
+
+    #[test]
+    fn a_method_keeps_its_colour_whatever_it_is_compared_with() {
+        assert_eq!(Ink::method("yf", 0), Ink::method("yf", 2));
+        assert_ne!(Ink::method("other", 0), Ink::method("yf", 2));
+        assert!(METHODS.len() > 3);
+    }
+}

@@ -1,0 +1,136 @@
+//! In: what became of one sequence under one or more methods, as plain data. Out: one HTML page that needs nothing but itself.
+//!
+//! | section | of the paper |
+//! |---|---|
+//! | errors and improvement | Tables 2 to 4, equation 3 |
+//! | bars of RMSE and S.D. | Fig. 6 |
+//! | trajectory from above and from the side, errors over time | Fig. 5 |
+//! | pictures with static and dynamic features | Fig. 7 |
+//! | times | Table 5 |
+//!
+//! The same data give the same bytes. Measured times stand in elements with the attribute `data-timing`, and nowhere else: without
+//! them, the page of a run is the page of its repetition.
+
+mod axis;
+mod bars;
+mod figure;
+mod ink;
+mod over_time;
+mod page;
+mod path;
+mod scene;
+mod series;
+mod tables;
+mod views;
+
+use crate::{Evaluation, StampedPose};
+
+/// What a report is about.
+#[derive(Clone, Debug)]
+pub struct Report<'a> {
+    /// Name of the sequence.
+    pub sequence: &'a str,
+    /// What else there is to know of it, as name and value.
+    pub facts: Vec<(&'a str, String)>,
+    /// Stamps of all frames, sorted, ns.
+    pub frames_ns: &'a [i64],
+    /// The true trajectory, sorted by time, if it is known.
+    pub truth: Option<&'a [StampedPose]>,
+    /// The methods; the others are compared with the first.
+    pub methods: Vec<MethodReport<'a>>,
+    /// Stages that all methods share, such as rendering.
+    pub shared_stages: Vec<Stage>,
+    /// Wall time from the first frame to the last, of everything together, s.
+    pub wall_s: f64,
+    /// Version of the program.
+    pub version: &'a str,
+    /// The command that gives this report again.
+    pub command: String,
+}
+
+/// What one method made of the sequence.
+#[derive(Clone, Debug)]
+pub struct MethodReport<'a> {
+    /// Short name.
+    pub name: &'a str,
+    /// What it does, in a few words.
+    pub summary: &'a str,
+    /// Poses of the tracked frames, sorted by time.
+    pub trajectory: &'a [StampedPose],
+    /// Errors of the trajectory; `None` without truth, or if the two cannot be compared.
+    pub evaluation: Option<&'a Evaluation>,
+    /// What became of the frames.
+    pub frames: Frames,
+    /// Where the time went.
+    pub times: Times,
+    /// Pictures of some moments, in order of time.
+    pub pictures: Vec<Picture>,
+    /// The configuration, as text.
+    pub config: String,
+}
+
+/// What became of the frames.
+#[derive(Clone, Debug, Default)]
+pub struct Frames {
+    /// All frames.
+    pub total: usize,
+    /// Those whose pose is known.
+    pub tracked: usize,
+    /// Those without a pose after the map was begun.
+    pub lost: usize,
+    /// Those that could not be used, by kind of fault.
+    pub skipped: Vec<(String, usize)>,
+}
+
+/// Where the time went.
+#[derive(Clone, Debug, Default)]
+pub struct Times {
+    /// Wall time of the stages.
+    pub stages: Vec<Stage>,
+    /// Wall time of tracking alone, all frames together, s.
+    pub tracking_s: f64,
+    /// Processor time of tracking and detection, all threads together, without reading or rendering, s; `None` where it is not known.
+    pub cpu_s: Option<f64>,
+}
+
+/// Wall time of one stage.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// Its name.
+    pub name: String,
+    /// How often it ran.
+    pub count: usize,
+    /// Median, ms.
+    pub median_ms: f64,
+    /// 99th percentile, ms.
+    pub p99_ms: f64,
+}
+
+/// A picture of one moment.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Number of the frame, from 0.
+    pub frame: usize,
+    /// Why this moment is shown, if there is a reason.
+    pub note: &'static str,
+    /// The picture as PNG.
+    pub png: Vec<u8>,
+    /// Width and height, px.
+    pub size: [usize; 2],
+    /// Features that were trusted, and those that were not.
+    pub features: [usize; 2],
+}
+
+impl Report<'_> {
+    /// The page.
+    pub fn html(&self) -> String {
+        page::page(self).into_string()
+    }
+}
+
+impl Frames {
+    /// Share of all frames whose pose is known, %.
+    pub fn tracked_percent(&self) -> f64 {
+        if self.total == 0 { 0.0 } else { 100.0 * self.tracked as f64 / self.total as f64 }
+    }
+}

@@ -1,0 +1,292 @@
+//! In: a report. Out: its page. The template escapes every text that it is given.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::axis::length;
+use super::bars::bars;
+use super::ink::{self, Ink};
+use super::over_time::over_time;
+use super::scene::{Captioned, Scene};
+use super::views::views;
+use super::{MethodReport, Picture, Report, tables};
+use crate::improvement_percent;
+
+const STYLE: &str = include_str!("style.css");
+
+/// The whole page.
+pub fn page(report: &Report) -> Markup {
+    let scene = Scene::new(report);
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (report.sequence) " – yfslam" }
+                style { (PreEscaped(ink::style())) (PreEscaped(STYLE)) }
+            }
+            body {
+                main {
+                    (header(report))
+                    (accuracy(report, &scene))
+                    (trajectory(&scene))
+                    (errors(report, &scene))
+                    (pictures(report))
+                    (times(report))
+                    (setup(report))
+                }
+                footer { "yfslam " (report.version) }
+            }
+        }
+    }
+}
+
+fn header(report: &Report) -> Markup {
+    html! {
+        header {
+            p.eyebrow { "yfslam" }
+            h1 { (report.sequence) }
+            p.verdict { (verdict(report)) }
+            div.cards {
+                @for (place, method) in report.methods.iter().enumerate() { (card(method, place)) }
+            }
+            dl.facts {
+                @for (name, value) in &report.facts { div { dt { (name) } dd { (value) } } }
+            }
+        }
+    }
+}
+
+/// The last method in one sentence: it is the one that the report is about.
+fn verdict(report: &Report) -> Markup {
+    let Some(method) = report.methods.last() else { return html! {} };
+    let ate = method.evaluation.map(|e| e.ate.translation_m.rmse);
+    let before = report.methods.first().filter(|first| first.name != method.name);
+    let original = before.and_then(|first| Some((first.name, first.evaluation?.ate.translation_m.rmse)));
+    let better = ate.zip(original).and_then(|(ours, (name, rmse))| Some((improvement_percent(ours, rmse)?, name)));
+    html! {
+        b { (method.name) } " tracks " b { (percent(method.frames.tracked_percent())) } " of the frames"
+        @if let Some(ate) = ate { " with an error (ATE, RMSE) of " b { (length(ate)) } }
+        @if let Some((by, name)) = better {
+            @if by >= 0.0 { ", " (format!("{by:.1}")) " % less than " (name) } @else { ", " (format!("{:.1}", -by)) " % more than " (name) }
+        }
+        @if report.truth.is_none() { "; how far off is not known, for there is no ground truth" }
+        "."
+        @if let Some(ms) = ms_per_frame(method) {
+            span data-timing="" { " It takes " b { (format!("{ms:.1} ms")) } " of one processor core a frame." }
+        }
+    }
+}
+
+fn ms_per_frame(method: &MethodReport) -> Option<f64> {
+    Some(method.times.cpu_s? * 1e3 / method.frames.total.max(1) as f64)
+}
+
+fn card(method: &MethodReport, place: usize) -> Markup {
+    let color = format!("--accent:var({})", Ink::method(method.name, place).variable());
+    html! {
+        div.card style=(color) {
+            p.name { (method.name) }
+            p.summary { (method.summary) }
+            @match method.evaluation {
+                Some(e) => p.big { (length(e.ate.translation_m.rmse)) small { "ATE, RMSE" } },
+                None => p.big { (percent(method.frames.tracked_percent())) small { "of the frames tracked" } },
+            }
+            p.counts {
+                (method.frames.tracked) " of " (method.frames.total) " frames tracked"
+                @if method.frames.lost > 0 { ", " (method.frames.lost) " lost" }
+                @for (reason, count) in &method.frames.skipped { ", " (count) " skipped (" (reason) ")" }
+            }
+        }
+    }
+}
+
+fn percent(value: f64) -> String {
+    if value >= 100.0 { "100 %".into() } else { format!("{value:.1} %") }
+}
+
+fn accuracy(report: &Report, scene: &Scene) -> Markup {
+    if report.truth.is_none() {
+        return html! {
+            section #accuracy {
+                h2 { "Accuracy" }
+                p.none { "This sequence has no ground truth, so errors cannot be measured." }
+            }
+        };
+    }
+    html! {
+        section #accuracy {
+            h2 { "Accuracy" }
+            @for method in report.methods.iter().filter(|m| m.evaluation.is_none()) {
+                p.none { "The trajectory of " (method.name) " cannot be compared with the ground truth: too short, or too straight to be aligned." }
+            }
+            p.about {
+                "Absolute trajectory error (ATE) after alignment by rotation and translation; relative pose error (RPE) without. \
+                 Improvement is (1 − error / error of the first) · 100 %. S.D.: standard deviation."
+            }
+            div.pair {
+                (tables::errors(report))
+                @if let Some(bars) = bars(report, scene) { (figure(scene, &bars, false)) }
+            }
+        }
+    }
+}
+
+fn trajectory(scene: &Scene) -> Markup {
+    let about = if scene.truth.is_some() {
+        "Estimates, aligned to the ground truth by rotation and translation, and the ground truth."
+    } else {
+        "The estimate, in the frame of the first camera pose."
+    };
+    html! {
+        section #trajectory {
+            h2 { "Trajectory" }
+            p.about {
+                (about) " The dot is the start."
+                @if scene.any_lost() { " A cross is where tracking was lost; the faint line leads to where it was found again." }
+            }
+            div.pair { @for view in views(scene) { (figure(scene, &view, true)) } }
+        }
+    }
+}
+
+fn errors(report: &Report, scene: &Scene) -> Markup {
+    let figures = over_time(scene);
+    if figures.is_empty() || report.truth.is_none() {
+        return html! {};
+    }
+    html! {
+        section #errors {
+            h2 { "Error over time" }
+            p.about {
+                "Distance between the aligned estimate and the ground truth, and angles between them about the camera's viewing direction \
+                 (roll), its right (pitch) and its down (yaw). Angles are those that are left when the orientations are aligned: positions \
+                 along a line would not tell how the camera is turned about it."
+                @if scene.any_lost() { " Shaded: no pose." }
+            }
+            div.pair { @for one in &figures { (figure(scene, one, false)) } }
+        }
+    }
+}
+
+fn figure(scene: &Scene, captioned: &Captioned, with_truth: bool) -> Markup {
+    html! {
+        figure {
+            figcaption {
+                b { (captioned.title) }
+                span.legend {
+                    @if with_truth && scene.truth.is_some() { (key("ground truth", Ink::Truth)) }
+                    @for method in &scene.methods { (key(method.name, method.ink)) }
+                }
+            }
+            (PreEscaped(&captioned.svg))
+            @if !captioned.note.is_empty() { p.note { (captioned.note) } }
+        }
+    }
+}
+
+fn key(name: &str, ink: Ink) -> Markup {
+    html! { span { i style=(format!("background:var({})", ink.variable())) {} (name) } }
+}
+
+fn pictures(report: &Report) -> Markup {
+    let mut frames: Vec<usize> = report.methods.iter().flat_map(|m| &m.pictures).map(|p| p.frame).collect();
+    frames.sort_unstable();
+    frames.dedup();
+    if frames.is_empty() {
+        return html! {};
+    }
+    let one = report.methods.len() == 1;
+    html! {
+        section #pictures {
+            h2 { "What the filter saw" }
+            p.about {
+                span.legend {
+                    span { i.ring {} "static feature, matched to the map" }
+                    span { i.dim {} "static feature, not matched" }
+                    span { i.dynamic {} "dynamic feature, not used" }
+                    span { i.box {} "box of a person" }
+                }
+            }
+            div.pictures.grid[one] {
+                @for frame in frames {
+                    div.moment {
+                        @for (place, method) in report.methods.iter().enumerate() {
+                            @if let Some(picture) = method.pictures.iter().find(|p| p.frame == frame) {
+                                (moment(method, place, picture))
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn moment(method: &MethodReport, place: usize, picture: &Picture) -> Markup {
+    let [width, height] = picture.size;
+    let [used, dropped] = picture.features;
+    let color = format!("color:var({})", Ink::method(method.name, place).variable());
+    html! {
+        figure {
+            img width=(width) height=(height) alt=(format!("frame {} under {}", picture.frame, method.name))
+                src=(format!("data:image/png;base64,{}", STANDARD.encode(&picture.png)));
+            figcaption {
+                b style=(color) { (method.name) }
+                " frame " (picture.frame) @if !picture.note.is_empty() { ", " (picture.note) }
+                ": " (used) " features used, " (dropped) " dropped"
+            }
+        }
+    }
+}
+
+fn times(report: &Report) -> Markup {
+    html! {
+        section #times data-timing="" {
+            h2 { "Time" }
+            p.about {
+                "Wall time of each stage. Solid: median; light: 99 % of the runs took no longer. Detection runs beside feature extraction, \
+                 reading and rendering run ahead."
+            }
+            (tables::times(report))
+            table.figures.totals {
+                thead {
+                    tr { th {} th { "wall time (s)" } th { "frames a second" } th { "processor time (s)" } th { "a frame (ms)" } }
+                }
+                tbody {
+                    @for (place, method) in report.methods.iter().enumerate() {
+                        tr {
+                            th style=(format!("color:var({})", Ink::method(method.name, place).variable())) { (method.name) }
+                            td { (format!("{:.2}", method.times.tracking_s)) }
+                            td { (format!("{:.1}", method.frames.total as f64 / method.times.tracking_s.max(1e-9))) }
+                            td { (method.times.cpu_s.map_or("–".into(), |s| format!("{s:.2}"))) }
+                            td { (ms_per_frame(method).map_or("–".into(), |ms| format!("{ms:.2}"))) }
+                        }
+                    }
+                }
+            }
+            p.about {
+                "These are of tracking and detection alone. Everything together, reading or rendering included, took "
+                (format!("{:.2} s", report.wall_s)) "."
+            }
+        }
+    }
+}
+
+fn setup(report: &Report) -> Markup {
+    html! {
+        section #setup {
+            h2 { "Repeat it" }
+            pre.command { (report.command) }
+            @for method in &report.methods {
+                details {
+                    summary { "Configuration of " (method.name) }
+                    pre { (method.config) }
+                }
+            }
+        }
+    }
+}

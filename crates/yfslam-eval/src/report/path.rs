@@ -1,0 +1,93 @@
+//! In: a line of any length, anywhere. Out: the part of it inside a frame, in no more points than the eye can tell apart.
+
+/// A position in pixels or in the units of the axes.
+pub type Point = [f64; 2];
+
+/// The parts of a line inside the rectangle from `low` to `high`.
+pub fn clip(line: &[Point], low: Point, high: Point) -> Vec<Vec<Point>> {
+    let mut parts: Vec<Vec<Point>> = Vec::new();
+    let mut end = None;
+    for pair in line.windows(2) {
+        let &[a, b] = pair else { continue };
+        let Some([from, to]) = clip_segment(a, b, low, high) else { continue };
+        match parts.last_mut() {
+            Some(part) if end == Some(from) => part.push(to),
+            _ => parts.push(vec![from, to]),
+        }
+        end = Some(to);
+    }
+    parts
+}
+
+/// The part of the segment from `a` to `b` inside the rectangle (Liang and Barsky 1984); `None` if there is none, or no number.
+fn clip_segment(a: Point, b: Point, low: Point, high: Point) -> Option<[Point; 2]> {
+    let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+    for k in 0..2 {
+        let step = b[k] - a[k];
+        for (side, sign) in [(low[k], -1.0), (high[k], 1.0)] {
+            let (speed, room) = (sign * step, sign * (side - a[k]));
+            if speed < 0.0 {
+                enter = enter.max(room / speed);
+            } else if speed > 0.0 {
+                leave = leave.min(room / speed);
+            } else if !(room >= 0.0) {
+                return None;
+            }
+        }
+    }
+    let at = |t: f64| [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
+    // The ends are kept as they are: the next segment has to start at the same numbers.
+    let from = if enter > 0.0 { at(enter) } else { a };
+    let to = if leave < 1.0 { at(leave) } else { b };
+    (enter <= leave).then_some([from, to])
+}
+
+/// Leaves out points nearer to the last one kept than a tolerance in px, which starts at 0.3 and grows until `most` points are enough.
+///
+/// No point of the line is farther than the tolerance from those that are left; both ends stay.
+pub fn thin(line: &[Point], most: usize) -> Vec<Point> {
+    let mut tolerance = 0.3;
+    loop {
+        let kept = keep_apart(line, tolerance);
+        // Two points always suffice in the end, because the tolerance outgrows any figure.
+        if kept.len() <= most.max(2) || tolerance > 1e6 {
+            return kept;
+        }
+        tolerance *= 1.5;
+    }
+}
+
+fn keep_apart(line: &[Point], tolerance: f64) -> Vec<Point> {
+    let mut kept: Vec<Point> = Vec::new();
+    for (index, &point) in line.iter().enumerate() {
+        let near = kept.last().is_some_and(|last| (point[0] - last[0]).hypot(point[1] - last[1]) <= tolerance);
+        if !near || index + 1 == line.len() {
+            kept.push(point);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_leaves_the_frame_and_comes_back_becomes_two() {
+        let line = [[1.0, 1.0], [3.0, 1.0], [3.0, 3.0], [1.0, 3.0]];
+        let parts = clip(&line, [0.0, 0.0], [2.0, 4.0]);
+        assert_eq!(parts, [vec![[1.0, 1.0], [2.0, 1.0]], vec![[2.0, 3.0], [1.0, 3.0]]]);
+        assert_eq!(clip(&line, [0.0; 2], [4.0; 2]), [line.to_vec()]);
+        assert!(clip(&[[5.0, 5.0], [6.0, 6.0]], [0.0; 2], [4.0; 2]).is_empty());
+        assert!(clip(&[[f64::NAN, 1.0], [f64::NAN, 2.0]], [0.0; 2], [4.0; 2]).is_empty());
+    }
+
+    #[test]
+    fn a_line_of_any_length_keeps_its_peaks_in_few_points() {
+        let mut line: Vec<Point> = (0..100_000).map(|i| [f64::from(i) * 0.005, f64::from(i % 2) * 0.1]).collect();
+        line[40_000][1] = 90.0;
+        let kept = thin(&line, 2000);
+        assert!(kept.len() <= 2000, "{}", kept.len());
+        assert!(kept.contains(&line[40_000]) && kept.contains(&line[99_999]));
+    }
+}
