@@ -52,8 +52,11 @@ fn boxes_masks_settings_and_lists_are_those_of_the_world() {
     let known = &boxes["frames"][9];
     assert_eq!(known["timestamp_ns"], shot.frame.timestamp_ns);
     assert_eq!(known["boxes"].as_array().unwrap().len(), shot.boxes.len());
-    for (known, (instance, bbox)) in known["boxes"].as_array().unwrap().iter().zip(&shot.boxes) {
-        assert_eq!((&known["instance"], &known["class"]), (&(*instance).into(), &"person".into()));
+    for (known, (instance, class, bbox)) in known["boxes"].as_array().unwrap().iter().zip(&shot.boxes) {
+        assert_eq!(
+            (&known["instance"], &known["class"]),
+            (&(*instance).into(), &yfslam_synth::CLASS_NAMES[*class].into())
+        );
         assert_eq!(known["bbox"][2], f64::from(bbox.x_max));
     }
     let stamp = yfslam_io::time::format_stamp(shot.frame.timestamp_ns);

@@ -81,14 +81,16 @@ impl BoxList {
         })
     }
 
-    /// The boxes as detections of full score.
-    pub fn detections(&self) -> KnownDetections {
+    /// The boxes of the classes that are named, as detections of full score.
+    pub fn detections(&self, classes: &[String]) -> KnownDetections {
         let class = |name: &str| self.classes.iter().position(|known| known == name).unwrap_or(self.classes.len());
         let detection = |b: &InstanceBox| {
             let [x_min, y_min, x_max, y_max] = b.bbox;
             Detection { class: class(&b.class), score: 1.0, bbox: BoundingBox { x_min, y_min, x_max, y_max } }
         };
-        self.frames.iter().map(|frame| (frame.timestamp_ns, frame.boxes.iter().map(detection).collect())).collect()
+        let wanted = |b: &&InstanceBox| classes.contains(&b.class);
+        let detections = |frame: &FrameBoxes| frame.boxes.iter().filter(wanted).map(detection).collect();
+        self.frames.iter().map(|frame| (frame.timestamp_ns, detections(frame))).collect()
     }
 }
 
@@ -109,7 +111,7 @@ mod tests {
         list.write(&path).unwrap();
         let again = BoxList::read(&path).unwrap();
         assert_eq!(again, list);
-        let detections = again.detections();
+        let detections = again.detections(&["person".to_owned()]);
         assert_eq!(detections[&33_333_333][0].class, 1);
         assert_eq!(detections[&33_333_333][0].bbox.x_max, 30.0);
         assert!(detections[&66_666_667].is_empty());

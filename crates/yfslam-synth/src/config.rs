@@ -42,11 +42,13 @@ pub enum Activity {
     Walking,
     /// They sit (or stand, once the chairs are taken) and gesture a little.
     Sitting,
+    /// One sits, one sits down and gets up again and again, all others walk.
+    Crowd,
 }
 
 impl Activity {
     /// All activities with their names in specs.
-    pub const ALL: [(&str, Self); 2] = [("sitting", Self::Sitting), ("walking", Self::Walking)];
+    pub const ALL: [(&str, Self); 3] = [("sitting", Self::Sitting), ("walking", Self::Walking), ("crowd", Self::Crowd)];
 }
 
 /// Where it happens.
@@ -82,8 +84,10 @@ pub struct WorldConfig {
     pub activity: Activity,
     /// Number of people, 0 to 6.
     pub people: usize,
-    /// Mean share of the picture that walking people cover, 0 to 0.6. They walk nearer to the camera and linger before it
-    /// to meet it as well as they can; [`World::person_share`](crate::World::person_share) tells what was reached.
+    /// What moves besides people.
+    pub actors: ActorsConfig,
+    /// Mean share of the picture that all who walk or drive cover, 0 to 0.8. They linger before the camera, and walk nearer
+    /// to it, to meet it as well as they can; [`World::person_share`](crate::World::person_share) tells what was reached.
     pub person_share: f64,
     /// Number of frames.
     pub frames: usize,
@@ -113,6 +117,7 @@ impl Default for WorldConfig {
             motion: CameraMotion::Xyz,
             activity: Activity::Walking,
             people: 2,
+            actors: ActorsConfig::default(),
             person_share: 0.2,
             frames: 300,
             seed: 1,
@@ -125,6 +130,21 @@ impl Default for WorldConfig {
             antialias: true,
         }
     }
+}
+
+/// What moves besides people. Each is an actor with a number of its own; see [`CLASS_NAMES`](crate::CLASS_NAMES).
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ActorsConfig {
+    /// Number of rescue robots that drive around among the people; with them at most 6.
+    pub robots: usize,
+    /// Whether a walking person pushes a chair around: the first one who carries nothing.
+    pub pushed_chair: bool,
+    /// Whether the first walking person carries a box, puts it down, leaves it there and fetches it again.
+    pub carried_box: bool,
+    /// Whether a box is displaced while it and its new place are out of the camera's view. If that never happens within
+    /// the sequence, it stays where it is.
+    pub moved_object: bool,
 }
 
 /// The calibration of freiburg3 as the TUM benchmark's web page gives it: no distortion.
@@ -267,7 +287,7 @@ pub enum WorldError {
     },
 }
 
-/// Greatest number of people.
+/// Greatest number of people and robots together.
 pub const MAX_PEOPLE: usize = 6;
 
 impl WorldConfig {
@@ -277,7 +297,17 @@ impl WorldConfig {
         let size = 16..=4096;
         let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
         check(self.people <= MAX_PEOPLE, "people", self.people, "between 0 and 6")?;
-        check((0.0..=0.6).contains(&self.person_share), "person_share", self.person_share, "between 0 and 0.6")?;
+        let (robots, actors) = (self.actors.robots, &self.actors);
+        check(self.people + robots <= MAX_PEOPLE, "actors.robots", robots, "at most 6 together with the people")?;
+        let movers = usize::from(actors.pushed_chair) + usize::from(actors.carried_box);
+        let free = if self.activity == Activity::Walking { self.people } else { 0 };
+        check(
+            movers <= free,
+            "people",
+            self.people,
+            "at least as many as push a chair or carry a box, and they must walk (activity `walking`)",
+        )?;
+        check((0.0..=0.8).contains(&self.person_share), "person_share", self.person_share, "between 0 and 0.8")?;
         check((1..=1_000_000).contains(&self.frames), "frames", self.frames, "between 1 and 1000000")?;
         check(size.contains(&camera.width), "camera.width", camera.width, "between 16 and 4096 px")?;
         check(size.contains(&camera.height), "camera.height", camera.height, "between 16 and 4096 px")?;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! WorldConfig ─► scene ─► textures, light maps ─┐
-//!                people (skeleton, gait, way) ──┼─► render ─► sensor ─► SynthFrame
+//!                actors (people, robots, things) ┼─► render ─► sensor ─► SynthFrame
 //!                camera path ───────────────────┘
 //! ```
 //!
@@ -18,6 +18,7 @@
 //! # }
 //! ```
 
+mod actors;
 mod bake;
 mod bvh;
 mod camera_path;
@@ -25,7 +26,6 @@ mod config;
 mod flicker;
 mod light;
 mod mesh;
-mod people;
 mod render;
 mod rng;
 mod scene;
@@ -37,9 +37,11 @@ mod texture;
 mod tour;
 mod world;
 
+pub use actors::CLASS_NAMES;
 pub use config::{
-    Activity, CameraMotion, LightConfig, MAX_PEOPLE, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera,
+    Activity, ActorsConfig, CameraMotion, LightConfig, MAX_PEOPLE, SceneKind, SensorConfig, WorldConfig, WorldError,
+    default_camera,
 };
 pub use spec::{is_spec, parse, parse_with_camera, split};
 pub use suite::{NamedWorld, SUITE, names};
-pub use world::{CLASS_NAMES, SynthFrame, World};
+pub use world::{SynthFrame, World};

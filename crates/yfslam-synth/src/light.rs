@@ -171,13 +171,13 @@ impl Occluder {
 
 /// Point number `i` of a sequence that fills [0, 1]² evenly: the additive recurrence of the plastic number (Roberts,
 /// "The unreasonable effectiveness of quasirandom sequences", 2018).
-fn scattered(i: usize) -> [f32; 2] {
+pub fn scattered(i: usize) -> [f32; 2] {
     let n = i as f32 + 0.5;
     [(n * 0.754_877_7).fract(), (n * 0.569_840_3).fract()]
 }
 
 /// Cosine-weighted direction around `normal` (Malley's method).
-fn hemisphere(normal: &Vec3, s: f32, t: f32) -> Vec3 {
+pub fn hemisphere(normal: &Vec3, s: f32, t: f32) -> Vec3 {
     let axis = if normal.z.abs() < 0.7 { Vec3::z() } else { Vec3::x() };
     let a = normal.cross(&axis).normalize();
     let b = normal.cross(&a);

@@ -91,6 +91,20 @@ impl Mesh {
         }
     }
 
+    /// Adds a closed surface around +z of `nu` × `nv` cells whose normals follow from its shape; `surface` gives the position
+    /// at (u, v), u once around from +x over +y, v downwards.
+    pub fn sculpture(&mut self, nu: u32, nv: u32, patch: Patch, surface: impl Fn(f32, f32) -> Vec3) {
+        const STEP: f32 = 0.01;
+        self.grid(nu, nv, patch, |u, v| {
+            // u = 0 and u = 1 must be the same point to the bit, or the seam would show.
+            let u = if u >= 1.0 { 0.0 } else { u };
+            let around = |d: f32| surface((u + d).rem_euclid(1.0), v.clamp(STEP, 1.0 - STEP));
+            let along = |d: f32| surface(u, (v + d).clamp(0.0, 1.0));
+            let normal = (along(STEP) - along(-STEP)).cross(&(around(STEP) - around(-STEP)));
+            (surface(u, v), normal.try_normalize(1e-12).unwrap_or_else(Vec3::z))
+        });
+    }
+
     /// Adds a flat rectangle; `right` and `down` are its edges as seen from outside.
     pub fn rectangle(&mut self, top_left: Vec3, right: Vec3, down: Vec3, patch: Patch) {
         let normal = down.cross(&right).normalize();
@@ -115,6 +129,19 @@ impl Mesh {
             let normal = (side * dz.abs().max(1e-6) + Vec3::z() * dr * dz.signum()).normalize();
             (Vec3::new(rx * cos, ry * sin, z), normal)
         });
+    }
+
+    /// Appends `other`; `place(index, vertex)` gives each of its vertices.
+    pub fn append(&mut self, other: &Self, place: impl Fn(usize, &Vertex) -> Vertex) {
+        let (vertices, patches) = (self.vertices.len() as u32, self.patches.len() as u32);
+        self.vertices.extend(other.vertices.iter().enumerate().map(|(index, vertex)| place(index, vertex)));
+        self.triangles.extend(
+            other
+                .triangles
+                .iter()
+                .map(|t| Triangle { vertices: t.vertices.map(|v| v + vertices), patch: t.patch + patches }),
+        );
+        self.patches.extend(&other.patches);
     }
 
     /// Moves everything from vertex `first` on.

@@ -10,12 +10,12 @@ use rayon::prelude::*;
 use yfslam::image::{DepthImage, Image, RgbImage};
 use yfslam::{BoundingBox, Camera, Detection, RgbdFrame};
 
+use crate::actors::Actors;
 use crate::bake::Baker;
 use crate::camera_path::CameraPath;
 use crate::config::{WorldConfig, WorldError, default_camera};
 use crate::flicker;
 use crate::light::{Lights, Occluder};
-use crate::people::People;
 use crate::render::rays::RayTable;
 use crate::render::shade::View;
 use crate::render::{self, Backdrop, Picture};
@@ -26,9 +26,6 @@ use crate::sensor::blur::CameraMove;
 use crate::sensor::exposure::Meter;
 use crate::surfaces::Surfaces;
 
-/// Names of the classes of [`SynthFrame`]'s detections, by [`Detection::class`].
-pub const CLASS_NAMES: [&str; 1] = ["person"];
-
 /// Width of the small pictures that estimates are made on, px.
 const SMALL_WIDTH: usize = 48;
 
@@ -37,7 +34,7 @@ const SMALL_WIDTH: usize = 48;
 pub struct World {
     config: WorldConfig,
     scene: Scene,
-    people: People,
+    actors: Actors,
     path: CameraPath,
     surfaces: Surfaces,
     rays: RayTable,
@@ -56,12 +53,13 @@ pub struct SynthFrame {
     pub depth_timestamp_ns: i64,
     /// Exact pose at the time of the colour image: world from camera.
     pub t_world_cam: Isometry3<f64>,
-    /// 0 where the world stands still, k where person k (from 1) is seen.
+    /// 0 where the world stands still, k where actor k (from 1) is seen.
     pub instances: Image<u8>,
     /// Depth along the optical axis in metres without any error; 0 where nothing is seen.
     pub exact_depth: Image<f32>,
-    /// Exact boxes of the people who are visible enough, in the order of their numbers.
-    pub boxes: Vec<(u8, BoundingBox)>,
+    /// Exact boxes of the actors that are visible enough, in the order of their numbers: number, class (an index into
+    /// [`CLASS_NAMES`](crate::CLASS_NAMES)), tight bounds of the visible pixels.
+    pub boxes: Vec<(u8, usize, BoundingBox)>,
 }
 
 impl World {
@@ -72,19 +70,19 @@ impl World {
     pub fn new(config: &WorldConfig) -> Result<Self, WorldError> {
         config.validate()?;
         let mut scene = Scene::new(config.scene, config.seed);
-        let people = People::new(&mut scene, config);
+        let path = CameraPath::new(config, &scene);
+        let actors = Actors::new(&mut scene, config, &path);
         // Textures for the default focal length suit any other when they have as many more or fewer texels.
         let sharpness = config.camera.fx.max(config.camera.fy) / default_camera().fx;
         let baker = Baker::new(&scene.mesh, scene.lights.clone(), config.light.shadow_rays);
         let palette = std::mem::take(&mut scene.palette);
         let surfaces = Surfaces::new(palette, sharpness.clamp(0.05, 3.0) as f32, &scene.mesh, baker);
-        let path = CameraPath::new(config, &scene);
         let rays = RayTable::new(&config.camera);
         let small_rays = RayTable::new(&shrink(&config.camera, SMALL_WIDTH));
         let seconds = config.frames as f64 / config.camera.fps;
         let meter = Meter::new(seconds, config.sensor.auto_exposure, hash(config.seed, 0xae));
         let config = config.clone();
-        let mut world = Self { config, scene, people, path, surfaces, rays, small_rays, meter, person_share: 0.0 };
+        let mut world = Self { config, scene, actors, path, surfaces, rays, small_rays, meter, person_share: 0.0 };
         world.choose_distance();
         Ok(world)
     }
@@ -104,7 +102,7 @@ impl World {
         self.len() == 0
     }
 
-    /// Mean share of the picture that people cover over the sequence, estimated on small pictures of some frames.
+    /// Mean share of the picture that actors cover over the sequence, estimated on small pictures of some frames.
     pub fn person_share(&self) -> f64 {
         self.person_share
     }
@@ -129,7 +127,7 @@ impl World {
         let (width, height) = (self.rays.width, self.rays.height);
         let boxes = self.boxes(&picture.instance);
         let detections = self.config.detections.then(|| {
-            boxes.iter().map(|&(_, bbox)| Detection { class: 0, score: 1.0, bbox }).collect::<Vec<Detection>>()
+            boxes.iter().map(|&(_, class, bbox)| Detection { class, score: 1.0, bbox }).collect::<Vec<Detection>>()
         });
         SynthFrame {
             depth_timestamp_ns: to_ns(time + self.config.sensor.depth_offset_s),
@@ -147,12 +145,12 @@ impl World {
 
     fn render(&self, rays: &RayTable, time: f64, t_world_cam: &Isometry3<f64>) -> Picture {
         let brightness = flicker::brightness(self.config.light.flicker, self.config.seed, time);
-        let (people, occluders) = self.people.at(time, &self.scene.lights.dimmed(brightness));
+        let (actors, occluders) = self.actors.at(time, &self.scene.lights.dimmed(brightness));
         let t_cam_world = t_world_cam.inverse();
         let nearby =
             if self.config.light.moving_shadows { self.in_camera(&occluders, &t_cam_world) } else { Vec::new() };
         let view = View {
-            meshes: [&self.scene.mesh, &people],
+            meshes: [&self.scene.mesh, &actors],
             surfaces: &self.surfaces,
             brightness,
             occluders: &nearby,
@@ -198,10 +196,10 @@ impl World {
         occluders.iter().map(|o| Occluder { center: moved(o), ..*o }).collect()
     }
 
-    /// Boxes around the visible pixels of everyone with enough of them.
-    fn boxes(&self, instances: &[u8]) -> Vec<(u8, BoundingBox)> {
+    /// Boxes around the visible pixels of every actor with enough of them.
+    fn boxes(&self, instances: &[u8]) -> Vec<(u8, usize, BoundingBox)> {
         let least = self.config.min_person_px as f64 * instances.len() as f64 / (640.0 * 480.0);
-        let mut found = vec![(0usize, [usize::MAX, usize::MAX, 0, 0]); self.config.people + 1];
+        let mut found = vec![(0usize, [usize::MAX, usize::MAX, 0, 0]); self.actors.len() + 1];
         for (i, &instance) in instances.iter().enumerate() {
             if instance > 0 {
                 let (x, y) = (i % self.rays.width, i / self.rays.width);
@@ -214,12 +212,12 @@ impl World {
         visible
             .map(|(instance, (_, [x0, y0, x1, y1]))| {
                 let bbox = BoundingBox { x_min: *x0 as f32, y_min: *y0 as f32, x_max: *x1 as f32, y_max: *y1 as f32 };
-                (instance, bbox)
+                (instance, self.actors.class(instance) as usize, bbox)
             })
             .collect()
     }
 
-    /// Searches how near people walk, so that they cover the wanted share of the picture.
+    /// Searches how near people and robots come, so that all actors cover the wanted share of the picture.
     fn choose_distance(&mut self) {
         const FRAMES: usize = 24;
         let rays = self.small_rays.clone();
@@ -229,30 +227,30 @@ impl World {
             times.iter().map(|&t| Backdrop::new(&rays, self.path.pose(t).inverse(), &self.scene.mesh)).collect();
         // Light does not matter for the share.
         let dark = Lights::default();
-        let share = |people: &People| {
-            let shares = times.par_iter().zip(&backdrops).map(|(&t, b)| b.share(&rays, &people.at(t, &dark).0));
+        let share = |actors: &Actors| {
+            let shares = times.par_iter().zip(&backdrops).map(|(&t, b)| b.share(&rays, &actors.at(t, &dark).0));
             // Summed in order: a parallel sum would depend on the threads.
             shares.collect::<Vec<f64>>().iter().sum::<f64>() / count as f64
         };
-        if !self.people.anyone_walks() {
-            self.person_share = share(&self.people);
+        if !self.actors.anyone_walks() {
+            self.person_share = share(&self.actors);
             return;
         }
         let mut try_out = |closeness: f64| {
-            self.people.set_closeness(&self.scene, &self.config, closeness);
-            let reached = share(&self.people);
+            self.actors.set_closeness(&self.scene, &self.config, closeness);
+            let reached = share(&self.actors);
             ((reached - self.config.person_share).abs(), closeness, reached)
         };
         let mut best = try_out(-1.0);
-        let mut step = 0.25;
-        for k in -3..=4 {
+        let mut step = 0.5;
+        for k in -1..=4 {
             let tried = try_out(f64::from(k) * step);
             best = if tried.0 < best.0 { tried } else { best };
         }
         for _ in 0..4 {
             step /= 2.0;
             for closeness in [best.1 - step, best.1 + step] {
-                let tried = try_out(closeness.min(1.0));
+                let tried = try_out(closeness.min(2.0));
                 best = if tried.0 < best.0 { tried } else { best };
             }
         }

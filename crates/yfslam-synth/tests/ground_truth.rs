@@ -146,9 +146,9 @@ fn boxes_are_the_tight_bounds_of_the_masks_and_detections_repeat_them() {
                 .filter(|&(x, y)| shot.instances.get(x, y) == Some(&person))
                 .map(|(x, y)| (x as f32, y as f32))
                 .collect();
-            let found = shot.boxes.iter().find(|(k, _)| *k == person);
+            let found = shot.boxes.iter().find(|(k, ..)| *k == person);
             assert_eq!(found.is_some(), pixels.len() as f64 >= least, "person {person}: {} pixels", pixels.len());
-            if let Some((_, bbox)) = found {
+            if let Some((_, _, bbox)) = found {
                 boxes += 1;
                 assert!(pixels.iter().all(|&(x, y)| bbox.contains(x, y)));
                 for (edge, reached) in [
@@ -163,7 +163,7 @@ fn boxes_are_the_tight_bounds_of_the_masks_and_detections_repeat_them() {
         }
         let detections = shot.frame.detections.unwrap();
         assert_eq!(detections.len(), shot.boxes.len());
-        for (detection, (_, bbox)) in detections.iter().zip(&shot.boxes) {
+        for (detection, (_, _, bbox)) in detections.iter().zip(&shot.boxes) {
             assert_eq!((detection.class, detection.score, detection.bbox), (0, 1.0, *bbox));
         }
     }

@@ -70,7 +70,7 @@ pub fn run(args: &DemoArgs, terminal: Terminal) -> Result<()> {
     let spec = format!("synth:walking_xyz?people=4&share=0.5&frames={}&seed={}", args.frames, args.seed);
     let out = OutputFolder::prepare(args.out.as_deref(), "demo")?;
     terminal.note(&format!("rendering {spec}; the boxes of people come from the renderer, not from a network"));
-    let mut source = SourceArgs::new(spec.clone()).open(true)?;
+    let mut source = SourceArgs::new(spec.clone()).open(Some(&Config::default().dynamic.movable))?;
     let mut contenders = contenders(args, &source)?;
     let rendering = drive(&mut source, &mut contenders, terminal);
 

@@ -89,7 +89,8 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
             BoxSource::Folder
         }
     };
-    let mut source = args.source.open(matches!(boxes, BoxSource::Renderer | BoxSource::Folder))?;
+    let own_boxes = matches!(boxes, BoxSource::Renderer | BoxSource::Folder);
+    let mut source = args.source.open(own_boxes.then_some(&*config.dynamic.movable))?;
     let truth = find_truth(args, &source, terminal)?;
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
     let pictures = args.overlay.then(|| Overlay::prepare(out.path(), config.dynamic.open_score)).transpose()?;

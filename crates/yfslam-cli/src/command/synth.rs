@@ -114,9 +114,9 @@ fn list() -> Result<()> {
 }
 
 fn frame_boxes(shot: &SynthFrame) -> FrameBoxes {
-    let boxes = shot.boxes.iter().map(|(instance, b)| InstanceBox {
+    let boxes = shot.boxes.iter().map(|(instance, class, b)| InstanceBox {
         instance: *instance,
-        class: CLASS_NAMES[0].to_owned(),
+        class: CLASS_NAMES[*class].to_owned(),
         bbox: [b.x_min, b.y_min, b.x_max, b.y_max],
     });
     FrameBoxes { timestamp_ns: shot.frame.timestamp_ns, boxes: boxes.collect() }

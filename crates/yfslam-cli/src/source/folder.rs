@@ -18,8 +18,8 @@ use crate::pipeline::Stages;
 /// Frames of the whole sequence that are tried where the first ones are unusable.
 const PROBES: usize = 30;
 
-/// Opens the folder, finds its camera and checks both against the first frames; reads its boxes if `own_boxes` asks for them.
-pub fn open(args: &SourceArgs, own_boxes: bool) -> Result<Source> {
+/// Opens the folder, finds its camera and checks both against the first frames; reads its boxes of the classes that `own_boxes` names.
+pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
     let sequence = open_sequence(args)?;
     let camera = camera(args)?;
     if !camera.unused_keys.is_empty() {
@@ -27,11 +27,11 @@ pub fn open(args: &SourceArgs, own_boxes: bool) -> Result<Source> {
     }
     check(&sequence, &camera.camera)?;
     let boxes = match own_boxes {
-        true => {
-            let detections = BoxList::read(&args.boxes_file())?.detections();
+        Some(classes) => {
+            let detections = BoxList::read(&args.boxes_file())?.detections(classes);
             Some(FolderBoxes { detections, mirror: sequence.mirror })
         }
-        false => None,
+        None => None,
     };
     let stream = FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?;
     let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();

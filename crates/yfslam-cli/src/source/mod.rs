@@ -169,11 +169,11 @@ impl SourceArgs {
         }
     }
 
-    /// Opens the sequence. Frames bring the boxes that the world or the folder knows if `own_boxes` asks for them.
+    /// Opens the sequence. Frames bring the boxes that the world or the folder knows, of the classes that `own_boxes` names.
     ///
     /// # Errors
     /// What cannot be read, with file, value and cure.
-    pub fn open(&self, own_boxes: bool) -> Result<Source> {
+    pub fn open(&self, own_boxes: Option<&[String]>) -> Result<Source> {
         if self.is_synthetic() { synth::open(self, own_boxes) } else { folder::open(self, own_boxes) }
     }
 

@@ -11,7 +11,7 @@ use yfslam::RgbdFrame;
 use yfslam_eval::StampedPose;
 use yfslam_io::CameraSource;
 use yfslam_io::time::TimeMirror;
-use yfslam_synth::{World, WorldConfig};
+use yfslam_synth::{CLASS_NAMES, World, WorldConfig};
 
 use super::{Frames, Player, Source, SourceArgs, Truth};
 use crate::pipeline::Stages;
@@ -36,9 +36,9 @@ struct Part {
 }
 
 /// Builds the world that the spec names and starts to render it.
-pub fn open(args: &SourceArgs, own_boxes: bool) -> Result<Source> {
+pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
     let mut config = args.world()?;
-    config.detections = own_boxes;
+    config.detections = own_boxes.is_some();
     let count = config.frames;
     let range = args.start..args.end.unwrap_or(count).min(count);
     ensure!(
@@ -53,7 +53,9 @@ pub fn open(args: &SourceArgs, own_boxes: bool) -> Result<Source> {
     let part = Part { range, mirror: args.reverse.then_some(span) };
     let stamps_ns: Vec<i64> = part.indices().map(|index| part.stamp_ns(&world, index)).collect();
     let (name, _) = yfslam_synth::split(&args.sequence);
-    let renderer = Renderer::start(world, part.clone())?;
+    let known = own_boxes.unwrap_or_default();
+    let classes = (0..CLASS_NAMES.len()).filter(|&class| known.iter().any(|name| name == CLASS_NAMES[class])).collect();
+    let renderer = Renderer::start(world, part.clone(), classes)?;
     Ok(Source {
         name: name.into(),
         camera: world_camera(&config),
@@ -84,13 +86,15 @@ impl Part {
 }
 
 impl Renderer {
-    fn start(world: Arc<World>, part: Part) -> Result<Self> {
+    /// Starts to render; of the boxes only those of `classes` are kept.
+    fn start(world: Arc<World>, part: Part, classes: Vec<usize>) -> Result<Self> {
         let (sender, frames) = sync_channel(LOOK_AHEAD);
         let (rendered, played) = (world.clone(), part.clone());
         let render = move || {
             for index in played.indices() {
                 let started = Instant::now();
                 let mut frame = rendered.frame(index).frame;
+                frame.detections.iter_mut().for_each(|boxes| boxes.retain(|b| classes.contains(&b.class)));
                 frame.timestamp_ns = played.stamp_ns(&rendered, index);
                 // The receiver is gone: the run has ended.
                 if sender.send((frame, started.elapsed())).is_err() {

@@ -20,8 +20,8 @@ pub fn desk(b: &mut Builder, base: Vec3, width: f32, depth: f32, height: f32) {
         let at = base + Vec3::new(sx * (width / 2.0 - 0.05), sy * (depth / 2.0 - 0.05), 0.0);
         b.cuboid(at, Vec3::new(0.05, 0.05, height - 0.03), 0.0, |_| Material::Plain(STEEL));
     }
-    let panel = base + Vec3::new(0.0, depth / 2.0 - 0.12, 0.30);
-    b.cuboid(panel, Vec3::new(width - 0.2, 0.02, height - 0.36), 0.0, |_| Material::Plain([0.62, 0.64, 0.66]));
+    let panel = base + Vec3::new(0.0, depth / 2.0 - 0.12, 0.04);
+    b.cuboid(panel, Vec3::new(width - 0.12, 0.02, height - 0.10), 0.0, |_| Material::Plain([0.62, 0.64, 0.66]));
 }
 
 /// A monitor that faces −y before it is turned by `yaw`; `base` is where its foot stands.

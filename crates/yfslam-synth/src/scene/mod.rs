@@ -2,7 +2,7 @@
 
 pub mod builder;
 mod corridor;
-mod furniture;
+pub mod furniture;
 mod lab;
 mod office;
 mod rescue;

@@ -35,7 +35,7 @@ pub fn build(seed: u64) -> Scene {
         mesh: b.mesh,
         palette: b.palette,
         lights: Lights { lamps, ambient: [[0.66, 0.66, 0.69], [0.48, 0.45, 0.41]] },
-        camera: look_at(Point3::new(0.0, -1.75, 1.36), Point3::new(0.0, 1.2, 0.86)),
+        camera: look_at(Point3::new(0.0, -1.75, 1.38), Point3::new(0.0, 1.2, 0.98)),
         walk_center: Point3::new(0.0, 0.9, 0.0),
         walk_half_width: 2.3,
         walk_far_y: 2.3,

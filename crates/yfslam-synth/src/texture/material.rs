@@ -4,8 +4,8 @@
 //! texels, so that grain and print have their natural size.
 
 use super::canvas::Canvas;
-use super::noise::{cell, fractal};
-use super::{Color, building, print};
+use super::noise::cell;
+use super::{Color, building, person, print};
 use crate::rng::Rng;
 
 /// Patterns of clothes.
@@ -19,6 +19,10 @@ pub enum Pattern {
     Motifs,
     /// A word and a sign on chest and back.
     Print,
+    /// An open jacket over a shirt of the second colour, with zip, collar and pockets.
+    Jacket,
+    /// A shirt with fine checks, a button placket and a breast pocket.
+    Buttons,
 }
 
 /// A kind of surface.
@@ -56,10 +60,14 @@ pub enum Material {
     Outdoors,
     /// Woven cloth, plain.
     Cloth(Color),
+    /// Plain clothes with creases.
+    Garment(Color),
     /// Clothes of two colours with a pattern.
     Shirt(Color, Color, Pattern),
-    /// A face and the hair around it.
-    Head(Color, Color),
+    /// Skin.
+    Skin(Color),
+    /// A face and the hair around it; with a beard or without.
+    Head(Color, Color, bool),
     /// Hair.
     Hair(Color),
     /// Leaves of a plant.
@@ -92,8 +100,8 @@ impl Material {
     /// Density of texels that the material needs, relative to printed matter.
     pub fn detail(&self) -> f32 {
         match self {
-            Self::Plain(_) | Self::Pages | Self::Hair(_) => 0.4,
-            Self::Cloth(_) | Self::Leaves | Self::Paint(_) => 0.7,
+            Self::Plain(_) | Self::Pages | Self::Hair(_) | Self::Skin(_) => 0.4,
+            Self::Cloth(_) | Self::Garment(_) | Self::Leaves | Self::Paint(_) => 0.7,
             _ => 1.0,
         }
     }
@@ -122,9 +130,11 @@ impl Material {
             Self::Whiteboard => print::whiteboard(&mut canvas, m, &mut rng),
             Self::Outdoors => print::outdoors(&mut canvas, seed, &mut rng),
             Self::Cloth(color) => cloth(&mut canvas, color, m, seed),
-            Self::Shirt(base, accent, pattern) => shirt(&mut canvas, [base, accent], pattern, m, seed),
-            Self::Head(skin, hair) => head(&mut canvas, skin, hair, seed),
-            Self::Hair(color) => hair_strands(&mut canvas, color, seed),
+            Self::Garment(color) => person::garment(&mut canvas, color, m, seed),
+            Self::Shirt(base, accent, pattern) => person::shirt(&mut canvas, [base, accent], pattern, m, seed),
+            Self::Skin(color) => person::skin(&mut canvas, color, m, seed),
+            Self::Head(skin, hair, beard) => person::head(&mut canvas, skin, hair, beard, seed),
+            Self::Hair(color) => person::hair_strands(&mut canvas, color, seed),
             Self::Leaves => leaves(&mut canvas, m, seed),
             Self::Concrete(color) => building::concrete(&mut canvas, color, m, seed, &mut rng),
             Self::Paint(color) => building::paint(&mut canvas, color, m, seed, &mut rng),
@@ -241,90 +251,6 @@ fn cloth(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
         let weave = cell(seed, x * m * 350.0, y * m * 350.0) - 0.5;
         tint(color, 1.0 + 0.16 * weave + 0.45 * (fold - 0.5))
     });
-}
-
-fn shirt(canvas: &mut Canvas, [base, accent]: [Color; 2], pattern: Pattern, m: f32, seed: u64) {
-    let (width, height) = (canvas.width() as f32, canvas.height() as f32);
-    let mut rng = Rng::new(seed, 0x51);
-    match pattern {
-        Pattern::Stripes => canvas.shade(|_, y, _| if (y * m / 0.045).fract() < 0.4 { accent } else { base }),
-        Pattern::Checks => canvas.shade(|x, y, _| {
-            let on = |t: f32| f32::from(u8::from((t * m / 0.07).fract() < 0.45));
-            let thin = |t: f32| (t * m / 0.07 + 0.28).fract() < 0.06;
-            let ground = blend(base, accent, 0.5 * (on(x) + on(y)));
-            if thin(x) || thin(y) { tint(ground, 0.5) } else { ground }
-        }),
-        Pattern::Motifs => canvas.shade(|x, y, _| {
-            let (row, cells) = ((y * m / 0.05).floor(), 0.05);
-            let (u, v) = ((x * m / cells + 0.5 * (row % 2.0)).fract(), (y * m / cells).fract());
-            let ring = (u - 0.5).abs().max((v - 0.5).abs());
-            if ring < 0.12 || (ring > 0.2 && ring < 0.28) { accent } else { base }
-        }),
-        Pattern::Print => {
-            canvas.fill(base);
-            // u = 1/4 is the chest, 3/4 the back.
-            for front in [0.25, 0.75] {
-                let size = (0.10 / m).min(width * 0.16);
-                canvas.rect(width * front - size, height * 0.30, 2.0 * size, 1.6 * size, accent);
-                print::word(
-                    canvas,
-                    width * front - 0.85 * size,
-                    height * 0.30 + 0.2 * size,
-                    1.7 * size,
-                    base,
-                    &mut rng,
-                );
-                canvas.disc(width * front, height * 0.30 + 1.15 * size, 0.3 * size, base);
-            }
-        }
-    }
-    canvas.shade_with([canvas.field(seed ^ 1, [8.0 * m, 5.0 * m], 4)], |x, y, old, [fold]| {
-        let weave = cell(seed, x * m * 330.0, y * m * 330.0) - 0.5;
-        tint(old, 1.0 + 0.10 * weave + 0.40 * (fold - 0.5))
-    });
-}
-
-fn head(canvas: &mut Canvas, skin: Color, hair: Color, seed: u64) {
-    let (width, height) = (canvas.width() as f32, canvas.height() as f32);
-    canvas.shade(|x, y, _| {
-        // u = 1/4 looks forward; v = 0 is the crown.
-        let (u, v) = (x / width - 0.25, y / height);
-        let u = if u > 0.5 { u - 1.0 } else { u };
-        let fringe = 0.03 * (fractal(seed, x * 0.15, 0.0, 2) - 0.5);
-        let line = if u.abs() < 0.15 {
-            0.34
-        } else if u.abs() < 0.2 {
-            0.55
-        } else {
-            0.72
-        };
-        if v < line + fringe {
-            let strand = fractal(seed ^ 1, x * 0.5, y * 0.05, 2) - 0.5;
-            return tint(hair, 1.0 + 0.7 * strand);
-        }
-        let blotch = fractal(seed ^ 2, x * 0.08, y * 0.08, 3) - 0.5;
-        let near = |cu: f32, cv: f32, ru: f32, rv: f32| ((u - cu) / ru).powi(2) + ((v - cv) / rv).powi(2) < 1.0;
-        let side = u.abs();
-        let feature = if ((side - 0.055) / 0.022).abs() < 1.0 && (v - 0.425).abs() < 0.012 {
-            Some(tint(hair, 0.8)) // brow
-        } else if ((side - 0.055) / 0.009).powi(2) + ((v - 0.475) / 0.016).powi(2) < 1.0 {
-            Some([0.12, 0.10, 0.09]) // iris
-        } else if ((side - 0.055) / 0.022).powi(2) + ((v - 0.475) / 0.016).powi(2) < 1.0 {
-            Some([0.88, 0.86, 0.84]) // eye
-        } else if near(0.0, 0.60, 0.018, 0.014) {
-            Some(tint(skin, 0.72)) // nostrils
-        } else if near(0.0, 0.69, 0.045, 0.018) {
-            Some([0.66, 0.32, 0.30]) // mouth
-        } else {
-            None
-        };
-        tint(feature.unwrap_or(skin), 1.0 + 0.12 * blotch)
-    });
-}
-
-fn hair_strands(canvas: &mut Canvas, color: Color, seed: u64) {
-    let strands = canvas.field(seed, [0.6, 0.06], 3);
-    canvas.shade_with([strands], |_, _, _, [strand]| tint(color, 1.0 + 0.8 * (strand - 0.5)));
 }
 
 fn leaves(canvas: &mut Canvas, m: f32, seed: u64) {

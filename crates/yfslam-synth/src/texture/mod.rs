@@ -8,9 +8,11 @@ pub mod canvas;
 pub mod font;
 pub mod material;
 pub mod noise;
+mod person;
 pub mod print;
 
 use canvas::Canvas;
+pub use person::hairline;
 
 /// Gamma-2 colour: the square root of linear light, each channel in [0, 1].
 pub type Color = [f32; 3];

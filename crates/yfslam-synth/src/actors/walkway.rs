@@ -27,6 +27,8 @@ struct Leg {
     /// Where one looks while standing, relative to the direction of the way, rad.
     glance: f64,
     pause: f64,
+    /// Number of the stop at the end.
+    stop: usize,
 }
 
 /// A place to stop at.
@@ -45,12 +47,20 @@ pub struct Stop {
 pub struct Step {
     /// Position on the floor, m.
     pub position: [f64; 2],
-    /// Direction of the body: angle about +z from +y, rad.
+    /// Direction of the way: angle about +z from +y, rad.
     pub heading: f64,
+    /// Where one looks, relative to that, rad.
+    pub glance: f64,
     /// Distance walked along the way, counted from somewhere, m.
     pub distance: f64,
     /// Speed, m/s.
     pub speed: f64,
+    /// Number of legs walked before this one, counted from somewhere; round by round.
+    pub legs_before: i64,
+    /// Time spent at the stop at the end of this leg, s; 0 while walking there.
+    pub waited: f64,
+    /// How long one stays there, s.
+    pub pause: f64,
 }
 
 const SAMPLES_PER_SPAN: usize = 24;
@@ -90,7 +100,8 @@ impl Walkway {
             let length = total - (start_arc - end_arc).rem_euclid(total);
             // The smooth profile's mean speed is a share 1 - RAMP of its plateau.
             let walk_time = length / (speed * (1.0 - RAMP));
-            legs.push(Leg { start_time: time, walk_time, start_arc, length, glance: stop.glance, pause: stop.pause });
+            let (glance, pause) = (stop.glance, stop.pause);
+            legs.push(Leg { start_time: time, walk_time, start_arc, length, glance, pause, stop: index });
             if index == 0 {
                 visit = time + walk_time + stop.pause / 2.0;
             }
@@ -113,11 +124,37 @@ impl Walkway {
         let walked = ((t - leg.start_time) / leg.walk_time).min(1.0);
         let (share, rate) = profile(walked);
         let arc = leg.start_arc + share * leg.length;
-        let rest = ((t - leg.start_time - leg.walk_time) / leg.pause).clamp(0.0, 1.0);
-        let glance = leg.glance * (std::f64::consts::PI * rest).sin().powi(2);
+        let waited = (t - leg.start_time - leg.walk_time).clamp(0.0, leg.pause);
+        let glance = leg.glance * turned(waited, leg.pause);
         let (position, heading) = self.locate(arc);
         let distance = rounds * self.arc[self.arc.len() - 1] + arc;
-        Step { position, heading: heading + glance, distance, speed: rate * leg.length / leg.walk_time }
+        Step {
+            position,
+            heading,
+            glance,
+            distance,
+            speed: rate * leg.length / leg.walk_time,
+            legs_before: rounds as i64 * self.legs.len() as i64 + k as i64,
+            waited,
+            pause: leg.pause,
+        }
+    }
+
+    /// Legs of a round, and on which of them one walks to stop number `stop`.
+    pub fn leg_to(&self, stop: usize) -> (i64, i64) {
+        let leg = self.legs.iter().position(|leg| leg.stop == stop).unwrap_or(0);
+        (self.legs.len() as i64, leg as i64)
+    }
+
+    /// Position and direction of the way at stop number `stop`.
+    pub fn place_of(&self, stop: usize) -> ([f64; 2], f64) {
+        let leg = self.legs[self.leg_to(stop).1 as usize];
+        self.locate(leg.start_arc + leg.length)
+    }
+
+    /// Whether one walks clockwise, seen from above.
+    pub fn is_clockwise(&self) -> bool {
+        self.clockwise
     }
 
     fn locate(&self, arc: f64) -> ([f64; 2], f64) {
@@ -141,6 +178,12 @@ impl Walkway {
 
 /// Share of a leg's time spent on speeding up, and as much on slowing down.
 const RAMP: f64 = 0.2;
+
+/// Share of a glance after `waited` of `pause` seconds: one turns within a second, stays, and turns back.
+fn turned(waited: f64, pause: f64) -> f64 {
+    let t = (waited.min(pause - waited) / (pause / 2.0).min(1.0)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
 
 /// Share of the way and relative speed at share `t` of the time: speed rises as a smoothstep, stays, falls.
 fn profile(t: f64) -> (f64, f64) {
@@ -191,7 +234,7 @@ mod tests {
             assert!((pair[0].speed - speed).abs() < 0.05, "{} is not {speed}", pair[0].speed);
             let walked = (pair[1].distance - pair[0].distance) / h;
             assert!((walked - speed).abs() < 0.01, "the way counts {walked} m/s instead of {speed}");
-            let turn = (pair[1].heading - pair[0].heading).sin().abs();
+            let turn = (pair[1].heading + pair[1].glance - pair[0].heading - pair[0].glance).sin().abs();
             assert!(turn < 0.06, "turns by {turn} rad in {h} s");
         }
     }

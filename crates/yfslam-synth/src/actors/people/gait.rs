@@ -77,11 +77,25 @@ pub fn stand(seed: u64, time: f32) -> Joints {
     j
 }
 
-/// Joints of someone who sits.
-pub fn sit(seed: u64, time: f32) -> Joints {
+/// Joints of someone who bends down to the floor (1) with straight legs at 0; the feet stay below the hips.
+pub fn stoop(j: &mut Joints, depth: f32) {
+    const LEGS: f32 = 0.95;
+    for side in [0, 1] {
+        j.hip[side] += LEGS * depth;
+        j.knee[side] += 2.0 * LEGS * depth;
+        j.ankle[side] += LEGS * depth;
+        j.spread[side] += 0.10 * depth;
+    }
+    j.trunk[0] += 1.2 * depth;
+    j.head[0] += 0.3 * depth;
+}
+
+/// Joints of someone who sits with the hip joints `height` metres above the floor, shanks upright, soles on the floor.
+pub fn sit(p: &Proportions, height: f32, seed: u64, time: f32) -> Joints {
+    let bend = ((height - p.shank() - p.ankle()) / p.thigh()).clamp(-0.3, 0.9).acos();
     let mut j = Joints {
-        hip: [1.48; 2],
-        knee: [1.48; 2],
+        hip: [bend; 2],
+        knee: [bend; 2],
         spread: [0.12; 2],
         shoulder: [0.28; 2],
         elbow: [1.05; 2],

@@ -4,26 +4,39 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::skeleton::{Bone, BonePoses, Proportions};
-use crate::light::Lights;
-use crate::mesh::{Lighting, Mesh, Patch, Vec3};
+use rayon::prelude::*;
+
+use super::skeleton::{self, BONES, Bone, BonePoses, Proportions};
+use crate::bvh::Bvh;
+use crate::light::{Lights, hemisphere, scattered};
+use crate::mesh::{Lighting, Mesh, Patch, Vec3, Vertex};
 use crate::rng::Rng;
 use crate::scene::builder::Palette;
-use crate::texture::material::{Material, Pattern};
+use crate::texture::material::{Material, Pattern, blend, tint};
 
-const SKINS: [[f32; 3]; 4] = [[0.86, 0.68, 0.56], [0.78, 0.58, 0.45], [0.60, 0.42, 0.31], [0.46, 0.31, 0.23]];
-const HAIRS: [[f32; 3]; 4] = [[0.16, 0.12, 0.10], [0.34, 0.22, 0.14], [0.60, 0.46, 0.28], [0.24, 0.23, 0.23]];
+const SKINS: [[f32; 3]; 5] =
+    [[0.90, 0.72, 0.62], [0.86, 0.67, 0.55], [0.80, 0.60, 0.48], [0.64, 0.45, 0.34], [0.50, 0.35, 0.27]];
+const HAIRS: [[f32; 3]; 5] =
+    [[0.16, 0.12, 0.10], [0.30, 0.20, 0.13], [0.62, 0.48, 0.30], [0.22, 0.21, 0.21], [0.50, 0.49, 0.48]];
 const SHIRTS: [[[f32; 3]; 2]; 6] = [
-    [[0.72, 0.20, 0.18], [0.92, 0.90, 0.86]],
-    [[0.20, 0.34, 0.58], [0.85, 0.86, 0.88]],
-    [[0.90, 0.89, 0.85], [0.16, 0.26, 0.42]],
-    [[0.22, 0.46, 0.34], [0.88, 0.78, 0.40]],
-    [[0.30, 0.29, 0.32], [0.86, 0.50, 0.20]],
-    [[0.85, 0.66, 0.24], [0.26, 0.22, 0.30]],
+    [[0.24, 0.28, 0.40], [0.80, 0.80, 0.78]],
+    [[0.66, 0.74, 0.86], [0.90, 0.91, 0.93]],
+    [[0.86, 0.85, 0.82], [0.22, 0.30, 0.44]],
+    [[0.58, 0.18, 0.18], [0.88, 0.84, 0.78]],
+    [[0.30, 0.29, 0.31], [0.66, 0.30, 0.22]],
+    [[0.24, 0.44, 0.38], [0.84, 0.80, 0.66]],
 ];
-const TROUSERS: [[f32; 3]; 4] = [[0.22, 0.27, 0.38], [0.26, 0.24, 0.23], [0.56, 0.49, 0.39], [0.34, 0.38, 0.42]];
+const TROUSERS: [[f32; 3]; 5] =
+    [[0.24, 0.30, 0.44], [0.22, 0.21, 0.22], [0.58, 0.51, 0.41], [0.36, 0.40, 0.46], [0.40, 0.46, 0.58]];
+const PATTERNS: [Pattern; 6] =
+    [Pattern::Jacket, Pattern::Buttons, Pattern::Stripes, Pattern::Checks, Pattern::Print, Pattern::Motifs];
 
-const PATTERNS: [Pattern; 4] = [Pattern::Stripes, Pattern::Checks, Pattern::Motifs, Pattern::Print];
+/// Rays per vertex for the light that a body keeps from itself, and how far they reach, m.
+const SELF_SHADE: (usize, f32) = (12, 0.40);
+
+/// Limb (trunk, head, arms, legs) of each bone.
+const LIMBS: [u8; BONES] = [0, 0, 1, 2, 3, 2, 3, 4, 5, 4, 5, 4, 5];
+const LIMB_COUNT: u8 = 6;
 
 /// A dressed body.
 #[derive(Clone, Debug)]
@@ -38,54 +51,87 @@ pub struct Body {
 impl Body {
     /// Person number `instance` (from 1); textures are ordered from `palette`.
     pub fn new(instance: u8, palette: &mut Palette, seed: u64) -> Self {
-        let style = Rng::new(seed, 0x57).below(12);
+        let style = Rng::new(seed, 0x57).below(36);
         let mut rng = Rng::new(seed, 0xb0d1 + u64::from(instance));
         let proportions = Proportions { height: rng.range(1.62, 1.86), girth: rng.range(0.92, 1.12) };
         let mut tailor = Tailor { mesh: Mesh::default(), bones: Vec::new(), palette, rng, instance, style };
         tailor.dress(&proportions);
-        Self { proportions, mesh: tailor.mesh, bones: tailor.bones }
+        let mut body = Self { proportions, mesh: tailor.mesh, bones: tailor.bones };
+        body.shade_itself();
+        body
+    }
+
+    /// Darkens what other limbs hide from light in a relaxed stand: armpits, below the chin, between the legs. A limb does
+    /// not shade itself: its joints bend.
+    fn shade_itself(&mut self) {
+        let joints = super::gait::stand(0, 0.0);
+        let poses = skeleton::forward_kinematics(&Isometry3::identity(), &self.proportions, &joints);
+        let mut posed = Mesh::default();
+        self.pose(&poses, &Lights::default(), &mut posed);
+        let limb_of = |vertex: u32| LIMBS[usize::from(self.bones[vertex as usize])];
+        let others: Vec<Bvh> = (0..LIMB_COUNT)
+            .into_par_iter()
+            .map(|limb| {
+                let triangles = posed.triangles.iter().filter(|t| limb_of(t.vertices[0]) != limb).copied().collect();
+                Bvh::new(&Mesh { vertices: posed.vertices.clone(), triangles, patches: posed.patches.clone() })
+            })
+            .collect();
+        let (rays, reach) = SELF_SHADE;
+        let open = |(index, vertex): (usize, &Vertex)| {
+            let bvh = &others[usize::from(limb_of(index as u32))];
+            let hidden = |[s, t]: &[f32; 2]| bvh.hit(&vertex.position, &hemisphere(&vertex.normal, *s, *t), reach);
+            let free = (0..rays).map(scattered).filter(|sample| !hidden(sample)).count();
+            0.30 + 0.70 * free as f32 / rays as f32
+        };
+        let open: Vec<f32> = posed.vertices.par_iter().enumerate().map(open).collect();
+        for (vertex, open) in self.mesh.vertices.iter_mut().zip(open) {
+            vertex.light = [open; 3];
+        }
     }
 
     /// Appends the body in the given pose to `out`, lit by `lights`.
     pub fn pose(&self, poses: &BonePoses, lights: &Lights, out: &mut Mesh) {
-        let (first_vertex, first_patch) = (out.vertices.len() as u32, out.patches.len() as u32);
-        out.vertices.extend(self.mesh.vertices.iter().zip(&self.bones).map(|(vertex, &bone)| {
-            let pose: &Isometry3<f32> = &poses[usize::from(bone)];
+        out.append(&self.mesh, |index, vertex| {
+            let pose: &Isometry3<f32> = &poses[usize::from(self.bones[index])];
             let position = (pose * Point3::from(vertex.position)).coords;
             let normal = pose.rotation * vertex.normal;
-            crate::mesh::Vertex { position, normal, light: lights.on_vertex(&position, &normal), ..*vertex }
-        }));
-        out.triangles.extend(self.mesh.triangles.iter().map(|t| crate::mesh::Triangle {
-            vertices: t.vertices.map(|v| v + first_vertex),
-            patch: t.patch + first_patch,
-        }));
-        out.patches.extend(&self.mesh.patches);
+            let light = lights.on_vertex(&position, &normal);
+            Vertex { position, normal, light: light.map(|l| l * vertex.light[0]), ..*vertex }
+        });
     }
 }
 
 /// Puts parts on bones.
-struct Tailor<'a> {
+pub struct Tailor<'a> {
     mesh: Mesh,
     bones: Vec<u8>,
     palette: &'a mut Palette,
-    rng: Rng,
+    /// Draws for variety.
+    pub rng: Rng,
     instance: u8,
     /// Shifts the choice of shirts, by the seed.
     style: usize,
 }
 
 impl Tailor<'_> {
-    fn patch(&mut self, material: Material, size_m: [f32; 2], density: f32) -> Patch {
+    /// A patch of the material.
+    pub fn patch(&mut self, material: Material, size_m: [f32; 2], density: f32) -> Patch {
         let texture = self.palette.order(material, size_m, density * material.detail(), self.rng.bits());
         Patch { texture, lighting: Lighting::Vertex, instance: self.instance }
     }
 
     /// A loft on `bone`, moved by `at` and tilted by `pitch` about the bone's x axis.
-    fn part(&mut self, bone: Bone, at: Vec3, pitch: f32, rings: &[[f32; 3]], patch: Patch) {
+    pub fn part(&mut self, bone: Bone, at: Vec3, pitch: f32, rings: &[[f32; 3]], patch: Patch) {
         let first = self.mesh.vertices.len();
         self.mesh.loft(16, rings, patch);
         let pose = Isometry3::new(at, Vec3::x() * pitch);
         self.mesh.transform_from(first, &pose);
+        self.bones.resize(self.mesh.vertices.len(), bone.index() as u8);
+    }
+
+    /// A closed surface on `bone`.
+    pub fn sculpture(&mut self, bone: Bone, nu: u32, nv: u32, patch: Patch, surface: impl Fn(f32, f32) -> Vec3) {
+        self.mesh.sculpture(nu, nv, patch, surface);
         self.bones.resize(self.mesh.vertices.len(), bone.index() as u8);
     }
 
@@ -98,23 +144,42 @@ impl Tailor<'_> {
         let (s, g) = (p.height / 1.75, p.girth);
         let top = p.trunk() - 0.06 + 0.045 * s;
         let shirt_material = Material::Shirt(shirt, accent, pattern);
-        let sleeve = if pattern == Pattern::Print { Material::Cloth(shirt) } else { shirt_material };
-        let patch = self.patch(shirt_material, [1.1, 0.68], 600.0);
+        // Sleeves have no print, zip or buttons.
+        let sleeve = match pattern {
+            Pattern::Print | Pattern::Jacket => Material::Garment(shirt),
+            Pattern::Buttons => Material::Garment(blend(shirt, accent, 0.5)),
+            _ => shirt_material,
+        };
+        let patch = self.patch(shirt_material, [1.1, 0.68], 700.0);
+        let belly = self.rng.range(0.95, 1.12);
         let trunk = [
-            [top + 0.035 * s, 0.045, 0.045],
-            [top + 0.02 * s, 0.065, 0.06],
-            [top - 0.005, 0.125 * s * g, 0.080 * s],
-            [top - 0.04 * s, 0.178 * s * g, 0.098 * s * g],
-            [top - 0.11 * s, 0.186 * s * g, 0.120 * s * g],
-            [top - 0.22 * s, 0.174 * s * g, 0.122 * s * g],
-            [top - 0.36 * s, 0.158 * s * g, 0.110 * s * g],
-            [-0.02, 0.172 * s * g, 0.124 * s * g],
-            [-0.10, 0.190 * s * g, 0.142 * s * g],
-            [-0.11, 0.184 * s * g, 0.136 * s * g],
-            [-0.10, 0.12, 0.09],
+            [top + 0.045 * s, 0.052 * s, 0.052 * s],
+            [top + 0.035 * s, 0.074 * s, 0.066 * s],
+            [top + 0.010 * s, 0.128 * s * g, 0.078 * s],
+            [top - 0.025 * s, 0.176 * s * g, 0.088 * s * g],
+            [top - 0.07 * s, 0.186 * s * g, 0.102 * s * g],
+            [top - 0.14 * s, 0.182 * s * g, 0.118 * s * g],
+            [top - 0.24 * s, 0.170 * s * g, 0.114 * s * g],
+            [top - 0.36 * s, 0.156 * s * g, 0.106 * s * g * belly],
+            [-0.02, 0.160 * s * g, 0.114 * s * g * belly],
+            [-0.09, 0.172 * s * g, 0.126 * s * g],
+            [-0.10, 0.168 * s * g, 0.122 * s * g],
+            [-0.09, 0.12, 0.09],
         ];
         self.part(Bone::Chest, Vec3::zeros(), 0.0, &smooth(&trunk), patch);
-        let patch = self.patch(Material::Cloth(trousers), [1.1, 0.3], 500.0);
+        let patch = self.patch(
+            Material::Garment(tint(if pattern == Pattern::Jacket { accent } else { shirt }, 0.85)),
+            [0.45, 0.06],
+            400.0,
+        );
+        let collar = [
+            [0.0, 0.050 * s, 0.050 * s],
+            [0.004, 0.058 * s, 0.060 * s],
+            [-0.03 * s, 0.070 * s, 0.066 * s],
+            [-0.05 * s, 0.08 * s, 0.07 * s],
+        ];
+        self.part(Bone::Chest, Vec3::new(0.0, -0.004, top + 0.062 * s), 0.08, &collar, patch);
+        let patch = self.patch(Material::Garment(trousers), [1.1, 0.3], 500.0);
         let hips = [
             [0.06, 0.12, 0.08],
             [0.04, 0.145 * s * g, 0.102 * s * g],
@@ -131,39 +196,29 @@ impl Tailor<'_> {
         }
     }
 
-    fn head(&mut self, s: f32, skin: [f32; 3], hair: [f32; 3]) {
-        let patch = self.patch(Material::Plain(skin), [0.36, 0.14], 400.0);
-        self.part(Bone::Head, Vec3::new(0.0, -0.01, 0.0), 0.0, &limb(0.06, 0.058 * s, 0.06 * s, 0.13), patch);
-        let patch = self.patch(Material::Head(skin, hair), [0.52, 0.33], 700.0);
-        self.part(
-            Bone::Head,
-            Vec3::new(0.0, 0.015, 0.135 * s),
-            0.0,
-            &ellipsoid([0.076 * s, 0.096 * s, 0.118 * s]),
-            patch,
-        );
-        let patch = self.patch(Material::Hair(hair), [0.55, 0.3], 500.0);
-        let cap = ellipsoid([0.083 * s, 0.092 * s, 0.105 * s]);
-        self.part(Bone::Head, Vec3::new(0.0, -0.008, 0.162 * s), 0.0, &cap, patch);
-        let patch = self.patch(Material::Plain(skin), [0.06, 0.05], 400.0);
-        let nose = ellipsoid([0.014 * s, 0.018 * s, 0.026 * s]);
-        self.part(Bone::Head, Vec3::new(0.0, 0.108 * s, 0.118 * s), 0.0, &nose, patch);
-    }
-
     fn arm(&mut self, p: &Proportions, side: usize, sleeve: Material, bare: bool, skin: [f32; 3]) {
         let s = p.height / 1.75;
         let patch = self.patch(sleeve, [0.36, p.upper_arm() + 0.1], 500.0);
         self.part(Bone::UpperArm(side), Vec3::zeros(), 0.0, &limb(0.0, 0.062 * s, 0.051 * s, p.upper_arm()), patch);
-        let material = if bare { Material::Plain(skin) } else { sleeve };
+        let material = if bare { Material::Skin(skin) } else { sleeve };
         let patch = self.patch(material, [0.28, p.forearm() + 0.08], 500.0);
         self.part(Bone::Forearm(side), Vec3::zeros(), 0.0, &limb(0.0, 0.043 * s, 0.030 * s, p.forearm()), patch);
-        let patch = self.patch(Material::Plain(skin), [0.2, 0.18], 400.0);
-        let hand = ellipsoid([0.022 * s, 0.042 * s, 0.085 * s]);
-        self.part(Bone::Forearm(side), -Vec3::z() * (p.forearm() + 0.065 * s), 0.0, &hand, patch);
+        // Palm, fingers and thumb; the thumb points forward.
+        let wrist = -Vec3::z() * p.forearm();
+        let sign = if side == 0 { 1.0 } else { -1.0 };
+        for (at, size, pitch) in [
+            ([-0.004 * sign, 0.0, -0.045], [0.018, 0.038, 0.055], 0.0),
+            ([-0.010 * sign, 0.004, -0.115], [0.013, 0.034, 0.052], 0.10),
+            ([-0.012 * sign, 0.040, -0.062], [0.012, 0.013, 0.040], 0.55),
+        ] {
+            let patch = self.patch(Material::Skin(skin), [0.12, 0.12], 400.0);
+            let shape = ellipsoid(size.map(|v| v * s));
+            self.part(Bone::Forearm(side), wrist + Vec3::from(at) * s, pitch, &shape, patch);
+        }
     }
 
     fn leg(&mut self, p: &Proportions, side: usize, s: f32, g: f32, trousers: [f32; 3]) {
-        let cloth = Material::Cloth(trousers);
+        let cloth = Material::Garment(trousers);
         let patch = self.patch(cloth, [0.52, p.thigh() + 0.14], 500.0);
         self.part(Bone::Thigh(side), Vec3::zeros(), 0.0, &limb(0.0, 0.082 * s * g, 0.060 * s, p.thigh()), patch);
         let patch = self.patch(cloth, [0.40, p.shank() + 0.1], 500.0);
@@ -197,7 +252,7 @@ impl Tailor<'_> {
 }
 
 /// Rings of an ellipsoid.
-fn ellipsoid([rx, ry, rz]: [f32; 3]) -> Vec<[f32; 3]> {
+pub fn ellipsoid([rx, ry, rz]: [f32; 3]) -> Vec<[f32; 3]> {
     (0..=8)
         .map(|i| {
             let (sin, cos) = (i as f32 * std::f32::consts::PI / 8.0).sin_cos();

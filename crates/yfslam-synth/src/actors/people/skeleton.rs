@@ -4,7 +4,7 @@
 //! and up (+z). Segment lengths as shares of body height follow Drillis and Contini, "Body segment parameters" (1966), as
 //! in Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
 
 use crate::mesh::Vec3;
 
@@ -50,6 +50,27 @@ pub struct Proportions {
     pub height: f32,
     /// Width of the trunk relative to an average one.
     pub girth: f32,
+}
+
+impl Joints {
+    /// Blend from `self` (0) to `other` (1), angle by angle.
+    pub fn blend(&self, other: &Self, t: f32) -> Self {
+        fn mix<const N: usize>(a: [f32; N], b: [f32; N], t: f32) -> [f32; N] {
+            std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)
+        }
+        Self {
+            trunk: mix(self.trunk, other.trunk, t),
+            head: mix(self.head, other.head, t),
+            shoulder: mix(self.shoulder, other.shoulder, t),
+            lift: mix(self.lift, other.lift, t),
+            elbow: mix(self.elbow, other.elbow, t),
+            hip: mix(self.hip, other.hip, t),
+            spread: mix(self.spread, other.spread, t),
+            knee: mix(self.knee, other.knee, t),
+            ankle: mix(self.ankle, other.ankle, t),
+            pelvis: mix(self.pelvis, other.pelvis, t),
+        }
+    }
 }
 
 impl Proportions {
@@ -163,11 +184,49 @@ pub fn forward_kinematics(root: &Isometry3<f32>, p: &Proportions, j: &Joints) ->
     poses
 }
 
+/// Bends an arm so that its palm comes to `target` (a point of the world), or as near as the arm is long; the elbow points down
+/// and outwards. The circle of possible elbows is that of two spheres around shoulder and palm.
+pub fn reach(poses: &mut BonePoses, p: &Proportions, side: usize, target: &Vec3) {
+    let (upper, lower) = (p.upper_arm(), p.forearm() + PALM * p.height);
+    let chest = poses[Bone::Chest.index()];
+    let shoulder = poses[Bone::UpperArm(side).index()].translation.vector;
+    let outwards = chest.rotation * Vec3::x() * if side == 0 { 1.0 } else { -1.0 };
+    let to = target - shoulder;
+    let distance = to.norm().clamp((upper - lower).abs() + 0.02, upper + lower - 0.003);
+    let along = to.normalize();
+    let share = (upper * upper - lower * lower + distance * distance) / (2.0 * distance);
+    let aside = (upper * upper - share * share).max(0.0).sqrt();
+    let pole = outwards * 0.7 - Vec3::z();
+    let pole = (pole - along * pole.dot(&along)).normalize();
+    let elbow = shoulder + along * share + pole * aside;
+    let palm = shoulder + along * distance;
+    let right = chest.rotation * Vec3::x();
+    poses[Bone::UpperArm(side).index()] = hanging(&shoulder, &elbow, &right);
+    poses[Bone::Forearm(side).index()] = hanging(&elbow, &palm, &right);
+}
+
+/// Wrist to palm as a share of body height.
+pub const PALM: f32 = 0.045;
+
+/// Where the palm of an arm is.
+pub fn palm(poses: &BonePoses, p: &Proportions, side: usize) -> Vec3 {
+    let wrist = Point3::new(0.0, 0.0, -p.forearm() - PALM * p.height);
+    (poses[Bone::Forearm(side).index()] * wrist).coords
+}
+
+/// Pose of a bone that starts at `from`, points to `to` and has its x axis about along `right`.
+fn hanging(from: &Vec3, to: &Vec3, right: &Vec3) -> Isometry3<f32> {
+    let z = (from - to).normalize();
+    let x = (right - z * right.dot(&z)).normalize();
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
+    Isometry3::from_parts(Translation3::from(*from), UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
 /// Height of the lowest point of the soles (heel or ball) for poses computed with the root at height 0.
 pub fn lowest_sole(poses: &BonePoses, p: &Proportions) -> f32 {
     let soles = [0, 1].into_iter().flat_map(|side| {
         let foot = poses[Bone::Foot(side).index()];
-        [-0.05, 0.14].map(|y| (foot * nalgebra::Point3::new(0.0, y, -p.ankle())).z)
+        [-0.05, 0.14].map(|y| (foot * Point3::new(0.0, y, -p.ankle())).z)
     });
     soles.fold(f32::INFINITY, f32::min)
 }

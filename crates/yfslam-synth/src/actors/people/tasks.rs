@@ -1,0 +1,195 @@
+//! What walkers do with their hands: push a chair, or carry a box from one stop to another and leave it there.
+//!
+//! In: where a walker is on the way. Out: the walker's bend, turn and arms, and the pose of the thing. The box visits the two
+//! stops P and Q (in walking order) in a cycle of three rounds: fetched at P, put down at Q, left there, fetched at Q, put
+//! down at P, left there.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+
+use super::skeleton::{self, BonePoses, Joints, Proportions};
+use super::{gait, smooth, upright};
+use crate::actors::walkway::{Step, Walkway};
+use crate::mesh::Vec3;
+
+/// Something to do while walking.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Task {
+    /// Nothing: the arms swing, and one looks around at stops.
+    Nothing,
+    /// Pushes a chair.
+    Push,
+    /// Carries a box between the first two stops.
+    Carry,
+}
+
+/// Size of the carried box: right, forward, up, m.
+pub const BOX_M: [f32; 3] = [0.36, 0.26, 0.24];
+/// Least pause at the stops where the box is fetched or put down, s.
+pub const HANDLING_S: f64 = 3.4;
+/// The two stops.
+const STOPS: [usize; 2] = [0, 1];
+/// From the pusher to the middle of the chair, m.
+const CHAIR_AHEAD_M: f32 = 0.68;
+/// Hands on the chair's back, in the chair's axes, m.
+const CHAIR_GRIP_M: [f32; 3] = [0.17, -0.25, 0.99];
+/// Where the box is held, relative to the hips: forward, up to its bottom, m.
+const HOLD_M: [f32; 2] = [0.31, 0.13];
+/// Where the box stands on the floor, ahead of the one who put it there, m.
+const PUT_AHEAD_M: f32 = 0.58;
+
+/// What happens to the box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Handling {
+    /// In the hands, while walking.
+    Held,
+    /// On the floor at a stop, nobody near.
+    Left(usize),
+    /// Being fetched or put down at a stop; the share of the time needed that has passed.
+    Fetched(usize, f32),
+    PutDown(usize, f32),
+}
+
+impl Task {
+    /// Bends the walker as the task asks for; returns the turn relative to the way if the task decides on it.
+    pub fn prepare(self, way: &Walkway, step: &Step, joints: &mut Joints) -> Option<f32> {
+        match self {
+            Self::Nothing => None,
+            Self::Push => {
+                joints.trunk[0] += 0.12;
+                Some(0.0)
+            }
+            Self::Carry => {
+                let (turned, bent) = match handling(way, step) {
+                    Handling::Fetched(_, t) | Handling::PutDown(_, t) => (turned(t), bent(t)),
+                    _ => return None,
+                };
+                gait::stoop(joints, bent);
+                Some(inwards(way) * turned)
+            }
+        }
+    }
+
+    /// Puts the hands where the task needs them.
+    pub fn hands(self, way: &Walkway, step: &Step, p: &Proportions, poses: &mut BonePoses) {
+        let (thing, grip, firm) = match self {
+            Self::Nothing => return,
+            Self::Push => (chair(step), CHAIR_GRIP_M, 1.0),
+            Self::Carry => {
+                let firm = match handling(way, step) {
+                    Handling::Held => 1.0,
+                    Handling::Left(_) => return,
+                    Handling::Fetched(_, t) => {
+                        if t >= 0.5 {
+                            1.0
+                        } else {
+                            bent(t)
+                        }
+                    }
+                    Handling::PutDown(_, t) => {
+                        if t < 0.5 {
+                            1.0
+                        } else {
+                            bent(t)
+                        }
+                    }
+                };
+                (carried_box(way, step, poses), [BOX_M[0] / 2.0 + 0.01, 0.0, 0.8 * BOX_M[2]], firm)
+            }
+        };
+        for (side, sign) in [(0, 1.0), (1, -1.0)] {
+            let on_thing = (thing * Point3::new(sign * grip[0], grip[1], grip[2])).coords;
+            let free = skeleton::palm(poses, p, side);
+            skeleton::reach(poses, p, side, &(free + (on_thing - free) * firm));
+        }
+    }
+}
+
+/// Pose of the pushed chair.
+pub fn chair(step: &Step) -> Isometry3<f32> {
+    let pusher = upright(step.position.map(|v| v as f32), 0.0, step.heading as f32);
+    pusher * Translation3::new(0.0, CHAIR_AHEAD_M, 0.0)
+}
+
+/// Pose of the box: the middle of its bottom, in the hands of the one whose bones are given, or on the floor.
+pub fn carried_box(way: &Walkway, step: &Step, poses: &BonePoses) -> Isometry3<f32> {
+    // The hips' own turn and roll are left out: hands keep a box level.
+    let hips = poses[0].translation.vector;
+    let held = |turned: f32| {
+        upright([hips.x, hips.y], hips.z, step.heading as f32 + inwards(way) * turned)
+            * Translation3::new(0.0, HOLD_M[0], HOLD_M[1])
+    };
+    let between = |stop: usize, t: f32| {
+        let (from, to, share) = (held(turned(t)), left_at(way, stop), bent(t));
+        Isometry3::from_parts(
+            Translation3::from(from.translation.vector.lerp(&to.translation.vector, share)),
+            from.rotation.nlerp(&to.rotation, share),
+        )
+    };
+    match handling(way, step) {
+        Handling::Held => held(0.0),
+        Handling::Left(stop) => left_at(way, stop),
+        Handling::Fetched(stop, t) => {
+            if t < 0.5 {
+                left_at(way, stop)
+            } else {
+                between(stop, t)
+            }
+        }
+        Handling::PutDown(stop, t) => {
+            if t >= 0.5 {
+                left_at(way, stop)
+            } else {
+                between(stop, t)
+            }
+        }
+    }
+}
+
+/// Pose of the box on the floor at a stop: beside the way, on its inner side.
+fn left_at(way: &Walkway, stop: usize) -> Isometry3<f32> {
+    let (position, heading) = way.place_of(stop);
+    let turn = UnitQuaternion::from_axis_angle(&Vec3::z_axis(), heading as f32 + inwards(way));
+    let ahead = turn * Vec3::new(0.0, PUT_AHEAD_M, 0.0);
+    let place = Translation3::new(position[0] as f32 + ahead.x, position[1] as f32 + ahead.y, 0.0);
+    Isometry3::from_parts(place, turn)
+}
+
+/// A quarter turn towards the middle of the round.
+fn inwards(way: &Walkway) -> f32 {
+    let quarter = std::f32::consts::FRAC_PI_2;
+    if way.is_clockwise() { -quarter } else { quarter }
+}
+
+/// How far one has turned to the side: there and back.
+fn turned(t: f32) -> f32 {
+    smooth(t / 0.2) * (1.0 - smooth((t - 0.8) / 0.2))
+}
+
+/// How far one has bent down: down to the floor at half time, and up again.
+fn bent(t: f32) -> f32 {
+    smooth((t - 0.17) / 0.28) * (1.0 - smooth((t - 0.55) / 0.28))
+}
+
+fn handling(way: &Walkway, step: &Step) -> Handling {
+    let (legs, first) = way.leg_to(STOPS[0]);
+    let (_, second) = way.leg_to(STOPS[1]);
+    // P is visited before Q in each round.
+    let (p, q) = if first < second { (STOPS[0], STOPS[1]) } else { (STOPS[1], STOPS[0]) };
+    let (leg_p, leg_q) = (first.min(second), first.max(second));
+    let (round, leg) = (step.legs_before.div_euclid(legs), step.legs_before.rem_euclid(legs));
+    // Arrivals before this leg's, and whether this leg leads to an arrival that has begun.
+    let before = 2 * round + i64::from(leg > leg_p) + i64::from(leg > leg_q);
+    let arrives = (leg == leg_p || leg == leg_q) && step.waited > 0.0;
+    let spare = (step.pause - HANDLING_S).max(0.0) / 2.0;
+    let t = ((step.waited - spare) / HANDLING_S.min(step.pause)).clamp(0.0, 1.0) as f32;
+    // What the last of the arrivals so far has made of the box.
+    match ((before + i64::from(arrives) - 1).rem_euclid(6), arrives) {
+        (0, true) => Handling::Fetched(p, t),
+        (1, true) => Handling::PutDown(q, t),
+        (3, true) => Handling::Fetched(q, t),
+        (4, true) => Handling::PutDown(p, t),
+        (0 | 3, false) => Handling::Held,
+        (1 | 2, _) => Handling::Left(q),
+        _ => Handling::Left(p),
+    }
+}
