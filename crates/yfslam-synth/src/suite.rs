@@ -49,6 +49,26 @@ pub const SUITE: &[NamedWorld] = &[
         walking(c, CameraMotion::Halfsphere);
     }),
     world(
+        "pushed_chair",
+        "someone pushes a chair around the desk while another one walks; the camera moves along its axes",
+        |c| {
+            walking(c, CameraMotion::Xyz);
+            c.actors.pushed_chair = true;
+        },
+    ),
+    world(
+        "carried_box",
+        "someone carries a box, puts it down, leaves it and fetches it; the camera moves on a half sphere",
+        |c| {
+            walking(c, CameraMotion::Halfsphere);
+            c.actors.carried_box = true;
+        },
+    ),
+    world("crowd", "six people, one of whom sits and one sits down and gets up, fill half of the picture", |c| {
+        (c.activity, c.motion) = (Activity::Crowd, CameraMotion::Xyz);
+        (c.people, c.person_share) = (6, 0.5);
+    }),
+    world(
         "corridor_loop",
         "people walk along four corridors around a block; the camera is carried around it once",
         |c| {
