@@ -2,7 +2,7 @@
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 
-use crate::command::{completions, config, demo, eval, info, run, synth};
+use crate::command::{bench, completions, config, demo, eval, info, run, synth};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -37,6 +37,7 @@ pub enum Command {
     Eval(eval::EvalArgs),
     Demo(demo::DemoArgs),
     Synth(synth::SynthArgs),
+    Bench(bench::BenchArgs),
     Info(info::InfoArgs),
     Config(config::ConfigArgs),
     Completions(completions::CompletionsArgs),

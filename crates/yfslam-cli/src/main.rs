@@ -5,6 +5,7 @@
 //! ```
 
 mod accuracy;
+mod bench;
 mod cli;
 mod command;
 mod cpu;

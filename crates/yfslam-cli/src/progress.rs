@@ -54,25 +54,27 @@ impl Progress {
             TrackingState::Tracking => "tracking",
             TrackingState::Lost => "lost",
         };
-        self.at(frames.total(), || format!("{state}  {:5.1} % tracked", frames.tracked_percent()));
+        self.frames(frames.total(), || format!("  {state}  {:5.1} % tracked", frames.tracked_percent()));
     }
 
-    /// Tells that `now` frames are done, and what about them.
-    pub fn at(&mut self, now: usize, about: impl Fn() -> String) {
+    /// Tells that `now` frames are done, how fast, and what about them.
+    pub fn frames(&mut self, now: usize, about: impl Fn() -> String) {
         let (since, done) = self.rate_since;
         if since.elapsed() >= RATE_OVER {
             self.fps = Some((now - done) as f64 / since.elapsed().as_secs_f64());
             self.rate_since = (Instant::now(), now);
         }
-        let message = || {
-            let fps = self.fps.map_or("    -".to_owned(), |fps| format!("{fps:5.1}"));
-            format!("{fps} fps  {}", about())
-        };
+        let fps = self.fps.map_or("    -".to_owned(), |fps| format!("{fps:5.1}"));
+        self.at(now, "frames", || format!("{fps} fps{}", about()));
+    }
+
+    /// Tells that `now` things are done, and what about them.
+    pub fn at(&mut self, now: usize, things: &str, message: impl Fn() -> String) {
         if let Some(bar) = &self.bar {
             bar.set_position(now as u64);
             bar.set_message(message());
         } else if self.lines && self.last_line.elapsed() >= LINE_EVERY {
-            let line = format!("{}: {now}/{} frames  {}", self.label, self.total, message());
+            let line = format!("{}: {now}/{} {things}  {}", self.label, self.total, message());
             self.last_line = Instant::now();
             // Nobody is left to tell if standard error is closed.
             let _ = writeln!(std::io::stderr().lock(), "{line}");

@@ -156,7 +156,6 @@ fn switch(key: &str, value: &str) -> Result<bool, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Activity, CameraMotion};
 
     fn message(spec: &str) -> String {
         parse(spec).unwrap_err().to_string()
@@ -175,6 +174,18 @@ mod tests {
     }
 
     #[test]
+    fn each_effect_of_the_sensor_has_its_switch() {
+        let off = parse("walking_xyz?blur=0&autoexposure=off&holes=off").unwrap().sensor;
+        assert_eq!((off.exposure_s, off.auto_exposure), (0.0, 0.0));
+        assert_eq!((off.holes, off.max_angle_deg, off.min_return), (false, 90.0, 0.0));
+        assert_eq!(off.color_noise, SensorConfig::default().color_noise);
+        let on = parse("walking_xyz?noise=off&blur=20&offset_ms=-12&autoexposure=on&holes=on").unwrap().sensor;
+        assert!((on.exposure_s - 0.02).abs() < 1e-12 && (on.depth_offset_s + 0.012).abs() < 1e-12);
+        assert!(on.auto_exposure > 0.0 && on.holes && on.min_return > 0.0);
+        assert!(message("walking_xyz?offset_ms=5000").contains("between -1 and 1 s"));
+    }
+
+    #[test]
     fn scene_motion_activity_and_light_are_keys_too() {
         let config =
             parse("synth:walking_xyz?scene=lab&motion=drive&activity=sitting&exposure=0.3&flicker=0.5").unwrap();
@@ -185,18 +196,6 @@ mod tests {
         assert_eq!((config.light.exposure, config.light.flicker), (0.3, 0.5));
         assert!(message("synth:?scene=attic").contains("use one of office, rescue, corridor, lab"));
         assert!(message("synth:?flicker=2").contains("between 0 and 1"));
-    }
-
-    #[test]
-    fn each_effect_of_the_sensor_has_its_switch() {
-        let off = parse("walking_xyz?blur=0&autoexposure=off&holes=off").unwrap().sensor;
-        assert_eq!((off.exposure_s, off.auto_exposure), (0.0, 0.0));
-        assert_eq!((off.holes, off.max_angle_deg, off.min_return), (false, 90.0, 0.0));
-        assert_eq!(off.color_noise, SensorConfig::default().color_noise);
-        let on = parse("walking_xyz?noise=off&blur=20&offset_ms=-12&autoexposure=on&holes=on").unwrap().sensor;
-        assert!((on.exposure_s - 0.02).abs() < 1e-12 && (on.depth_offset_s + 0.012).abs() < 1e-12);
-        assert!(on.auto_exposure > 0.0 && on.holes && on.min_return > 0.0);
-        assert!(message("walking_xyz?offset_ms=5000").contains("between -1 and 1 s"));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! In: a name. Out: what differs from [`WorldConfig::default`]. The eight `sitting_*` and `walking_*` follow the freiburg3 sequences of
 //! the TUM RGB-D benchmark (Sturm et al., IROS 2012).
 
-use crate::config::{Activity, CameraMotion, WorldConfig};
+use crate::config::{Activity, CameraMotion, SceneKind, WorldConfig};
 
 /// A world of the suite.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +48,44 @@ pub const SUITE: &[NamedWorld] = &[
     world("walking_halfsphere", "people walk through the picture; the camera moves on a half sphere", |c| {
         walking(c, CameraMotion::Halfsphere);
     }),
+    world(
+        "pushed_chair",
+        "someone pushes a chair around the desk while another one walks; the camera moves along its axes",
+        |c| {
+            walking(c, CameraMotion::Xyz);
+            c.actors.pushed_chair = true;
+        },
+    ),
+    world(
+        "carried_box",
+        "someone carries a box, puts it down, leaves it and fetches it; the camera moves on a half sphere",
+        |c| {
+            walking(c, CameraMotion::Halfsphere);
+            c.actors.carried_box = true;
+        },
+    ),
+    world("crowd", "six people, one of whom sits and one sits down and gets up, fill half of the picture", |c| {
+        (c.activity, c.motion) = (Activity::Crowd, CameraMotion::Xyz);
+        (c.people, c.person_share) = (6, 0.5);
+    }),
+    world(
+        "corridor_loop",
+        "people walk along four corridors around a block; the camera is carried around it once",
+        |c| {
+            walking(c, CameraMotion::Loop);
+            c.scene = SceneKind::Corridor;
+            c.frames = 1250;
+        },
+    ),
+    world(
+        "dark_rescue",
+        "a damaged hall with little texture and failing light; a robot drives through it past people",
+        |c| {
+            walking(c, CameraMotion::Drive);
+            c.scene = SceneKind::Rescue;
+            (c.light.exposure, c.light.flicker) = (0.5, 0.6);
+        },
+    ),
 ];
 
 fn sitting(config: &mut WorldConfig, motion: CameraMotion) {

@@ -1,5 +1,6 @@
 //! One file per subcommand.
 
+pub mod bench;
 pub mod completions;
 pub mod config;
 pub mod demo;
@@ -23,6 +24,7 @@ pub fn run(cli: &Cli) -> Result<()> {
         Command::Run(args) => run::run(args, terminal),
         Command::Eval(args) => eval::run(args, terminal),
         Command::Demo(args) => demo::run(args, terminal),
+        Command::Bench(args) => bench::run(args, terminal),
         Command::Synth(args) => synth::run(args, terminal),
         Command::Info(args) => info::run(args),
         Command::Config(args) => config::run(args),

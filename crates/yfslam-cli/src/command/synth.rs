@@ -92,7 +92,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
             writer.list(number, ListedStamps { color_ns: stamp, depth_ns: stamp.map(|ns| ns + offset_ns) });
             number += 1;
         }
-        progress.at(end, String::new);
+        progress.frames(end, String::new);
     }
     progress.finish();
     writer.write_text("world.toml", &toml::to_string(&config)?)?;

@@ -1,0 +1,139 @@
+//! `yfslam bench`: a table of accuracy over sequences, methods and seeds.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use anyhow::{Context, Result};
+use clap::{Args, value_parser};
+use yfslam_io::write_atomically;
+
+use crate::bench::{Bench, Plan, csv, markdown};
+use crate::output::OutputFolder;
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+
+const EXAMPLES: &str = "\
+Examples:
+  yfslam bench                                           the whole suite of synthetic worlds
+  yfslam bench walking_xyz walking_rpy --methods none,yf --seeds 5
+  yfslam bench rgbd_bonn_crowd --detector yolo-fastestv2.onnx --seeds 5 -- --camera bonn --grouping ransac
+  yfslam bench walking_static --frames 150 -- --fault covered@2+1
+
+In the output folder:
+  table.md   median, least and greatest error over the seeds
+  cells.csv  every run
+  cells/     every run as JSON; those that are there are not run again, unless program or options have changed
+  runs/      what each run left behind";
+
+/// Run sequences with several methods and seeds, and tabulate the errors. Can be stopped, and goes on where it stopped.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct BenchArgs {
+    /// Folders in TUM or Bonn layout with ground truth, or names of synthetic worlds [default: all worlds of the suite].
+    #[arg(value_name = "SEQUENCE")]
+    sequences: Vec<String>,
+    /// Methods to compare.
+    #[arg(long, value_name = "METHOD,METHOD", value_delimiter = ',', default_value = "none,boxes,yf",
+          value_parser = ["none", "boxes", "yf"])]
+    methods: Vec<String>,
+    /// Number of seeds: of the world if it is synthetic, else of the method's random draws.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = value_parser!(u64).range(1..=1000))]
+    seeds: u64,
+    /// Number of frames of each sequence [default: all].
+    #[arg(long, value_name = "N")]
+    frames: Option<u32>,
+    /// Network that finds people, for methods `boxes` and `yf` [default: synthetic worlds and boxes.json tell].
+    #[arg(long, value_name = "FILE.onnx")]
+    detector: Option<PathBuf>,
+    /// Runs at a time.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=256))]
+    jobs: u16,
+    /// Where results go [default: yfslam-out/bench].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Words for every `yfslam run`, after `--`.
+    #[arg(last = true, value_name = "OPTIONS OF RUN")]
+    extra: Vec<String>,
+}
+
+pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
+    let plans = args.plans()?;
+    let out = OutputFolder::prepare(args.out.as_deref(), "bench")?;
+    let program = std::env::current_exe().context("cannot find this program's own file")?;
+    let image = std::fs::read(&program).with_context(|| format!("cannot read {}", program.display()))?;
+    let bench = Bench {
+        folder: out.path().into(),
+        program,
+        program_crc32: format!("{:08x}", crc32fast::hash(&image)),
+        jobs: args.jobs.into(),
+        extra: args.extra.clone(),
+    };
+    let progress = Mutex::new(Progress::new(terminal, "bench", plans.len()));
+    let cells = bench.cells(&plans, |done| {
+        if let Ok(mut progress) = progress.lock() {
+            progress.at(done, "runs", String::new);
+        }
+    })?;
+    if let Ok(progress) = progress.into_inner() {
+        progress.finish();
+    }
+    for cell in cells.iter().filter(|cell| cell.failure.is_some()) {
+        let failure = cell.failure.as_deref().unwrap_or_default();
+        terminal.warn(&format!("{} with {}, seed {}: {failure}", cell.sequence, cell.method, cell.seed));
+    }
+    let table = markdown(&cells);
+    for (name, text) in [("table.md", &table), ("cells.csv", &csv(&cells))] {
+        write_atomically(&out.path().join(name), |file| file.write_all(text.as_bytes()))?;
+    }
+    terminal.result(&format!("{table}\nwritten to {}\n", out.path().display()))
+}
+
+impl BenchArgs {
+    /// All cells, sequence by sequence.
+    fn plans(&self) -> Result<Vec<Plan>> {
+        let suite = || yfslam_synth::names().into_iter().map(str::to_owned).collect();
+        let sequences = if self.sequences.is_empty() { suite() } else { self.sequences.clone() };
+        let mut plans = Vec::new();
+        for sequence in &sequences {
+            let folder = Path::new(sequence).is_dir();
+            if !folder {
+                // Better known before the first run than in the middle of the night.
+                yfslam_synth::parse(sequence).with_context(|| format!("{sequence} is no folder either"))?;
+            }
+            for method in &self.methods {
+                for seed in 1..=self.seeds {
+                    plans.push(if folder {
+                        self.recorded(sequence, method, seed)
+                    } else {
+                        self.world(sequence, method, seed)
+                    });
+                }
+            }
+        }
+        Ok(plans)
+    }
+
+    fn recorded(&self, folder: &str, method: &str, seed: u64) -> Plan {
+        let path = Path::new(folder);
+        let name = path.file_name().map_or(folder.into(), |name| name.to_string_lossy());
+        let mut options = vec!["--seed".to_owned(), seed.to_string()];
+        options.extend(self.frames.into_iter().flat_map(|frames| ["--end".to_owned(), frames.to_string()]));
+        self.plan(&name, folder.to_owned(), method, seed, options)
+    }
+
+    fn world(&self, spec: &str, method: &str, seed: u64) -> Plan {
+        let spec = spec.strip_prefix("synth:").unwrap_or(spec);
+        let mut source = format!("synth:{spec}{}seed={seed}", if spec.contains('?') { '&' } else { '?' });
+        if let Some(frames) = self.frames {
+            source += &format!("&frames={frames}");
+        }
+        self.plan(spec, source, method, seed, Vec::new())
+    }
+
+    fn plan(&self, name: &str, source: String, method: &str, seed: u64, mut options: Vec<String>) -> Plan {
+        if let Some(file) = self.detector.as_ref().filter(|_| method != "none") {
+            options.extend(["--detector".to_owned(), file.display().to_string()]);
+        }
+        Plan { sequence: name.to_owned(), source, method: method.to_owned(), seed, options }
+    }
+}
