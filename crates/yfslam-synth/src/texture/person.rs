@@ -43,7 +43,7 @@ pub(super) fn shirt(canvas: &mut Canvas, [base, accent]: [Color; 2], pattern: Pa
     };
     match pattern {
         Pattern::Stripes => canvas.shade(|_, y, _| if (y * m / 0.032).fract() < 0.35 { accent } else { base }),
-        Pattern::Checks => canvas.shade(|x, y, _| checks(x, y, 0.06)),
+        Pattern::Checks => canvas.shade(|x, y, _| checks(x, y, 0.038)),
         Pattern::Motifs => canvas.shade(|x, y, _| {
             let (row, cells) = ((y * m / 0.034).floor(), 0.034);
             let (u, v) = ((x * m / cells + 0.5 * (row % 2.0)).fract(), (y * m / cells).fract());
