@@ -125,6 +125,7 @@ fn switch(key: &str, value: &str) -> Result<bool, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::ActorsConfig;
 
     fn message(spec: &str) -> String {
         parse(spec).unwrap_err().to_string()
@@ -140,6 +141,17 @@ mod tests {
         assert!((config.camera.fx - 267.7).abs() < 1e-9 && (config.camera.cx - 159.8).abs() < 1e-9);
         assert_eq!(config.sensor, SensorConfig::perfect());
         assert!(config.detections);
+    }
+
+    #[test]
+    fn a_spec_says_what_moves() {
+        let config = parse("walking_xyz?people=3&robots=2&chair=on&carry=on&moved=on&share=0.8").unwrap();
+        let actors = ActorsConfig { robots: 2, pushed_chair: true, carried_box: true, moved_object: true };
+        assert_eq!((config.actors, config.person_share), (actors, 0.8));
+        assert_eq!(parse("walking_xyz?activity=crowd").unwrap().activity, Activity::Crowd);
+        assert!(message("walking_xyz?people=5&robots=2").contains("at most 6 together with the people"));
+        assert!(message("walking_xyz?people=1&chair=on&carry=on").contains("at least as many"));
+        assert!(message("walking_xyz?activity=running").contains("use sitting, walking or crowd"));
     }
 
     #[test]
