@@ -156,6 +156,7 @@ fn switch(key: &str, value: &str) -> Result<bool, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::ActorsConfig;
 
     fn message(spec: &str) -> String {
         parse(spec).unwrap_err().to_string()
@@ -196,6 +197,17 @@ mod tests {
         assert_eq!((config.light.exposure, config.light.flicker), (0.3, 0.5));
         assert!(message("synth:?scene=attic").contains("use one of office, rescue, corridor, lab"));
         assert!(message("synth:?flicker=2").contains("between 0 and 1"));
+    }
+
+    #[test]
+    fn a_spec_says_what_moves() {
+        let config = parse("walking_xyz?people=3&robots=2&chair=on&carry=on&moved=on&share=0.8").unwrap();
+        let actors = ActorsConfig { robots: 2, pushed_chair: true, carried_box: true, moved_object: true };
+        assert_eq!((config.actors, config.person_share), (actors, 0.8));
+        assert_eq!(parse("walking_xyz?activity=crowd").unwrap().activity, Activity::Crowd);
+        assert!(message("walking_xyz?people=5&robots=2").contains("at most 6 together with the people"));
+        assert!(message("walking_xyz?people=1&chair=on&carry=on").contains("at least as many"));
+        assert!(message("walking_xyz?activity=running").contains("use one of sitting, walking, crowd"));
     }
 
     #[test]

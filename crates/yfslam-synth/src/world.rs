@@ -279,3 +279,48 @@ fn to_ns(seconds: f64) -> i64 {
 fn image<T: Copy + Default>(width: usize, height: usize, data: Vec<T>) -> Image<T> {
     Image::from_vec(width, height, data).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::*;
+
+    #[test]
+    fn every_mask_lies_within_the_outline_of_its_actor_and_carries_its_class() {
+        let spec =
+            "walking_xyz?seed=3&people=3&robots=1&chair=on&carry=on&moved=on&share=0.3&width=320&height=240&noise=off";
+        let mut config = crate::parse(spec).unwrap();
+        config.light.shadow_rays = 0;
+        let world = World::new(&config).unwrap();
+        let mut seen = [0; 8];
+        for index in (0..300).step_by(30) {
+            let shot = world.frame(index);
+            let (mesh, _) = world.actors.at(world.seconds(index), &Lights::default());
+            let mut outlines = [[f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY]; 8];
+            for triangle in &mesh.triangles {
+                let instance = usize::from(mesh.patches[triangle.patch as usize].instance);
+                for vertex in triangle.vertices {
+                    let p = shot.t_world_cam.inverse() * Point3::from(mesh.vertices[vertex as usize].position.cast());
+                    // What reaches beside or behind the camera has no outline.
+                    let [x, y] = if p.z > 0.05 { config.camera.distort(p.x / p.z, p.y / p.z) } else { [f64::NAN; 2] };
+                    let [x0, y0, x1, y1] = &mut outlines[instance];
+                    let all = x.is_nan();
+                    (*x0, *y0) = if all { (-1e9, -1e9) } else { (x0.min(x), y0.min(y)) };
+                    (*x1, *y1) = if all { (1e9, 1e9) } else { (x1.max(x), y1.max(y)) };
+                }
+            }
+            for (i, &instance) in shot.instances.data().iter().enumerate().filter(|(_, k)| **k > 0) {
+                let (x, y) = ((i % 320) as f64, (i / 320) as f64);
+                let [x0, y0, x1, y1] = outlines[usize::from(instance)];
+                let inside = x >= x0 - 1.0 && x <= x1 + 1.0 && y >= y0 - 1.0 && y <= y1 + 1.0;
+                assert!(inside, "frame {index}: actor {instance} at ({x}, {y}), outside {x0}..{x1}, {y0}..{y1}");
+                seen[usize::from(instance)] += 1;
+            }
+            for (instance, class, _) in shot.boxes {
+                assert_eq!(class, [0, 0, 0, 1, 2, 3, 3][usize::from(instance) - 1], "actor {instance}");
+            }
+        }
+        assert!((1..=6).filter(|&k| seen[k] > 200).count() >= 5, "too little seen for a test: {seen:?}");
+    }
+}

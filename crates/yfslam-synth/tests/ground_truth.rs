@@ -294,7 +294,7 @@ fn the_same_seed_gives_the_same_bits_in_any_order_and_another_seed_does_not() {
 
 #[test]
 fn the_number_of_threads_does_not_change_a_bit() {
-    let mut config = config("walking_halfsphere?seed=13&people=4");
+    let mut config = config("walking_halfsphere?seed=13&people=4&robots=1&chair=on&carry=on&moved=on");
     config.sensor = SensorConfig::default();
     config.light.shadow_rays = 1;
     let render = |threads: usize| {

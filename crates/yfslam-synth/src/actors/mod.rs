@@ -7,6 +7,9 @@
 pub mod displaced;
 pub mod people;
 mod rounds;
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;
 mod thing;
 pub mod walkway;
 

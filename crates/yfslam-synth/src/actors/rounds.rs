@@ -10,8 +10,10 @@ use crate::rng::Rng;
 use crate::scene::Scene;
 
 const LANE_M: f64 = 0.5;
-/// Pause before the camera at closeness 1, and at 2, s; three of a lane do not catch up with each other.
-const LINGER_S: [f64; 2] = [8.0, 14.0];
+/// Pause before the camera at closeness 1, s.
+const LINGER_S: f64 = 8.0;
+/// The same at closeness 2, for one, two or three of a lane, who must not catch up with each other.
+const LONG_LINGER_S: [f64; 3] = [14.0, 14.0, 9.5];
 
 /// Index of the person who carries a box: the first one, whose inner lane has room at its side.
 pub fn carrier(config: &WorldConfig) -> Option<usize> {
@@ -71,18 +73,18 @@ pub fn round(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> W
     };
     // Shy people wait at the side, which the camera does not see.
     // At first only the inner lane lingers: from there, the camera sees people with their heads.
-    let linger = LINGER_S[0] + (LINGER_S[1] - LINGER_S[0]) * wall;
+    let going = walkers(scene, config) + config.actors.robots;
+    let in_lane = (0..going).filter(|&k| lane_of(k) == lane).count();
+    let linger = LINGER_S + (LONG_LINGER_S[in_lane.clamp(1, 3) - 1] - LINGER_S) * wall;
     let bold = linger * if lane == 1 { 2.0 * closeness } else { 2.0 * closeness - 1.0 }.clamp(0.0, 1.0);
     let shy = 10.0 * (1.0 - closeness);
-    let apart = 0.35 - 0.13 * wall;
+    let apart = 0.35 - 0.10 * wall;
     let stops = [
         stop(-apart, near, bold, handling),
         stop(apart, near, bold, handling),
         stop(0.0, far, 0.0, 0.0),
         stop(half, cy, shy, 0.0),
     ];
-    let going = walkers(scene, config) + config.actors.robots;
-    let in_lane = (0..going).filter(|&k| lane_of(k) == lane).count();
     let spread = (k / 2) as f64 / in_lane.max(1) as f64;
     // Someone of each lane comes by early, however short the sequence is; the lanes take turns, unless they are to hide as
     // much as they can.

@@ -43,7 +43,7 @@ pub(super) fn shirt(canvas: &mut Canvas, [base, accent]: [Color; 2], pattern: Pa
     };
     match pattern {
         Pattern::Stripes => canvas.shade(|_, y, _| if (y * m / 0.032).fract() < 0.35 { accent } else { base }),
-        Pattern::Checks => canvas.shade(|x, y, _| checks(x, y, 0.06)),
+        Pattern::Checks => canvas.shade(|x, y, _| checks(x, y, 0.038)),
         Pattern::Motifs => canvas.shade(|x, y, _| {
             let (row, cells) = ((y * m / 0.034).floor(), 0.034);
             let (u, v) = ((x * m / cells + 0.5 * (row % 2.0)).fract(), (y * m / cells).fract());
@@ -125,6 +125,8 @@ pub(super) fn head(canvas: &mut Canvas, skin: Color, hair: Color, beard: bool, s
         let [r, g, b] = tint(skin, 1.04 + 0.08 * blotch - shade);
         let ground = [r * (1.0 + 0.05 * flush), g * (1.0 - 0.07 * flush), b * (1.0 - 0.06 * flush)];
         let strands = 0.75 + 0.5 * fractal(seed ^ 4, x * 0.7, y * 0.15, 2);
+        let jaw = v > 0.63 && oval(0.0, 0.60, 0.20, 0.06) > 1.0 && oval(0.0, 0.70, 0.055, 0.035) > 1.0;
+        let moustache = (0.638..0.672).contains(&v) && side < 0.055;
         let brow_middle = 0.425 - 0.10 * (side - 0.055).max(0.0) + 0.9 * (side - 0.055).powi(2) * 4.0;
         if (0.022..0.092).contains(&side) && (v - brow_middle).abs() < 0.013 - 0.10 * (side - 0.05).max(0.0) {
             tint(hair, 0.75 * strands)
@@ -140,9 +142,7 @@ pub(super) fn head(canvas: &mut Canvas, skin: Color, hair: Color, beard: bool, s
             tint(skin, 0.40) // between the lips
         } else if oval(0.0, 0.692, 0.046, 0.021 - 0.012 * f32::from(u8::from(v < 0.692))) < 1.0 {
             blend(tint(skin, 0.85), [0.70, 0.30, 0.30], 0.55) // lips
-        } else if beard && v > 0.63 && oval(0.0, 0.60, 0.20, 0.06) > 1.0 && oval(0.0, 0.70, 0.055, 0.035) > 1.0 {
-            blend(ground, tint(hair, strands), 0.75)
-        } else if beard && (0.638..0.672).contains(&v) && side < 0.055 {
+        } else if beard && (jaw || moustache) {
             blend(ground, tint(hair, strands), 0.75)
         } else {
             let roots = ((hairline(side) + 0.02 - v) / 0.03).clamp(0.0, 1.0);

@@ -1,44 +1,103 @@
 //! Movements: a walking cycle, and sitting or standing with small gestures.
 //!
-//! In: how far and how fast someone walks, or the time. Out: joint angles. The walking cycle keeps the main harmonics of
-//! the joint angles in Winter, "Biomechanics and Motor Control of Human Movement", chapter 2.
+//! In: how far and how fast someone walks, or the time. Out: joint angles. Walking is built from the feet: each carries for
+//! 60 % of the cycle, rolls over its ball and swings forward (phases as in Winter, "Biomechanics and Motor Control of Human
+//! Movement", chapter 2); the law of cosines gives hip and knee.
 
 use std::f32::consts::TAU;
 
 use super::skeleton::{Joints, Proportions};
+use super::smooth;
 use crate::rng::Rng;
 
-/// Speed at which people stride out in full, m/s.
-const FULL_STRIDE_SPEED: f32 = 0.9;
-/// Swing of the hip at full stride, rad.
-const HIP_SWING: f32 = 0.42;
+/// Speed from which on people stride out in full, m/s; slower, they are about to stop.
+const FULL_STRIDE_SPEED: f32 = 0.7;
+/// Length of a stride (two steps) relative to the leg.
+const STRIDE: f32 = 1.5;
+/// Share of the cycle that a foot carries.
+const STANCE: f32 = 0.6;
+/// Where the foot is put down, ahead of the hips, as a share of the stride.
+const AHEAD: f32 = 0.255;
+/// Hips above the ankle of a foot that stands flat, relative to the leg.
+const HIPS: f32 = 0.93;
+/// From the ankle to the ball of the foot, and how far the heel rises about it, m and rad.
+const BALL_M: f32 = 0.14;
+const HEEL_RISE: f32 = 0.75;
+/// How high a foot is lifted while it swings, m.
+const LIFT_M: f32 = 0.05;
 
 /// Length of a full stride (two steps), m.
 pub fn stride(p: &Proportions) -> f32 {
-    4.0 * (p.thigh() + p.shank()) * HIP_SWING.sin() * 0.95
+    STRIDE * (p.thigh() + p.shank())
 }
 
-/// Joints of someone who has walked `distance` metres and moves at `speed` m/s; who halts, gestures.
+/// Joints of someone who has walked `distance` metres and moves at `speed` m/s; who halts, gestures. A foot that carries
+/// stays where it is on the way; the angles of its leg follow.
 pub fn walk(p: &Proportions, distance: f32, speed: f32, seed: u64, time: f32) -> Joints {
-    let effort = (speed / FULL_STRIDE_SPEED).clamp(0.0, 1.2);
-    let phase = (distance / stride(p)).fract() * TAU;
+    let effort = smooth(speed / FULL_STRIDE_SPEED);
+    let cycle = (distance / stride(p)).fract();
+    let mut stand = Joints { knee: [0.05; 2], hip: [0.025; 2], ankle: [0.025; 2], ..Joints::default() };
+    stand.elbow = [0.18; 2];
     let mut j = Joints::default();
-    for (side, offset) in [(0, 0.0), (1, TAU / 2.0)] {
-        let (sin, cos) = (phase + offset).sin_cos();
-        let swing = (-(phase + offset - 0.35).sin()).max(0.0);
-        j.hip[side] = effort * (HIP_SWING * cos + 0.06);
-        j.knee[side] = 0.06 + effort * (0.10 + 0.85 * swing * swing.sqrt());
-        // The foot stays about level while it carries, and its heel lifts at the end.
-        j.ankle[side] = 0.6 * (j.knee[side] - j.hip[side]) - effort * 0.25 * (sin * 0.5 - cos * 0.5).max(0.0);
-        j.shoulder[side] = -effort * 0.42 * cos + 0.02;
-        j.elbow[side] = 0.18 + effort * (0.22 - 0.15 * cos);
-        j.lift[side] = 0.10;
+    for (side, offset) in [(0, 0.0), (1, 0.5)] {
+        let at = (cycle + offset).rem_euclid(1.0);
+        let foot = foot(p, at);
+        let (hip, knee) = bend(p, foot.forward, HIPS * (p.thigh() + p.shank()) - foot.up);
+        (j.hip[side], j.knee[side], j.ankle[side]) = (hip, knee, foot.pitch - hip + knee);
+        // The arm swings against its leg, which is foremost when its foot is put down.
+        let cos = (at * TAU).cos();
+        j.shoulder[side] = -0.38 * cos + 0.02;
+        j.elbow[side] = 0.40 - 0.15 * cos;
     }
-    let (sin, cos) = phase.sin_cos();
-    j.pelvis = [0.10 * effort * cos, 0.04 * effort * sin];
-    j.trunk = [0.03 + 0.05 * effort, -0.08 * effort * cos, 0.0];
-    gestures(&mut j, seed, time, 0.9 * (1.0 - effort.min(1.0)));
+    let (sin, cos) = (cycle * TAU).sin_cos();
+    j.pelvis = [0.05 * cos, 0.03 * sin];
+    j.trunk = [0.05, -0.08 * cos, 0.0];
+    let mut j = stand.blend(&j, effort);
+    for side in [0, 1] {
+        j.lift[side] += 0.10;
+    }
+    j.trunk[0] += 0.03;
+    gestures(&mut j, seed, time, 0.9 * (1.0 - effort));
     j
+}
+
+/// A foot in the sagittal plane: its ankle relative to where it is when the foot stands flat below the hips, m, and the
+/// slope of the sole, toes up, rad.
+struct Foot {
+    forward: f32,
+    up: f32,
+    pitch: f32,
+}
+
+/// The foot at share `at` of the cycle that begins when it is put down.
+fn foot(p: &Proportions, at: f32) -> Foot {
+    let stride = stride(p);
+    // Turning about the ball moves the ankle up and forward.
+    let rolled = |heel: f32| {
+        let (sin, cos) = heel.sin_cos();
+        let a = p.ankle();
+        [BALL_M * (1.0 - cos) + a * sin, BALL_M * sin - a * (1.0 - cos)]
+    };
+    if at < STANCE {
+        let heel = HEEL_RISE * smooth((at / STANCE - 0.55) / 0.45);
+        let [forward, up] = rolled(heel);
+        return Foot { forward: stride * (AHEAD - at) + forward, up, pitch: -heel };
+    }
+    let t = (at - STANCE) / (1.0 - STANCE);
+    let heel = HEEL_RISE * (1.0 - smooth(t / 0.8));
+    let [forward, up] = rolled(heel);
+    let swing = AHEAD - STANCE + STANCE * smooth(t);
+    let lift = LIFT_M * (std::f32::consts::PI * t).sin().powi(2);
+    Foot { forward: stride * swing + forward, up: up + lift, pitch: -heel }
+}
+
+/// Angles of hip and knee that bring the ankle `forward` of the hip and `down` from it.
+fn bend(p: &Proportions, forward: f32, down: f32) -> (f32, f32) {
+    let (thigh, shank) = (p.thigh(), p.shank());
+    let reach = forward.hypot(down).clamp(0.3 * (thigh + shank), 0.999 * (thigh + shank));
+    let inside = ((thigh * thigh + shank * shank - reach * reach) / (2.0 * thigh * shank)).clamp(-1.0, 1.0).acos();
+    let above = ((thigh * thigh + reach * reach - shank * shank) / (2.0 * thigh * reach)).clamp(-1.0, 1.0).acos();
+    (forward.atan2(down) + above, std::f32::consts::PI - inside)
 }
 
 /// Slow, smooth, seeded sway in [-1, 1] or so; `channel` tells joints apart.

@@ -104,8 +104,7 @@ impl Person {
             (right + left) / 2.0
         };
         let forward = ankle(&sitting).y - ankle(&joints).y;
-        let z = hips + (self.height_on_floor(&joints) - hips) * smooth(risen * 3.0);
-        let root = upright([seat.position.x, seat.position.y], z, seat.heading)
+        let root = upright([seat.position.x, seat.position.y], self.height_on_floor(&joints), seat.heading)
             * Isometry3::from_parts(Translation3::new(0.0, forward, 0.0), UnitQuaternion::identity());
         skeleton::forward_kinematics(&root, p, &joints)
     }

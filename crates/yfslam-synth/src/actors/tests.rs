@@ -1,0 +1,191 @@
+//! What moves keeps to the laws of its world: things stay where they are put, hands hold what they carry, feet stand.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::people::skeleton::{self, Bone};
+use super::people::tasks::BOX_M;
+use super::*;
+use crate::camera_path::CameraPath;
+use crate::spec::parse;
+
+fn actors(spec: &str) -> (Actors, WorldConfig) {
+    let config = parse(spec).unwrap();
+    let mut scene = Scene::new(config.scene, config.seed);
+    let path = CameraPath::new(&config, &scene);
+    (Actors::new(&mut scene, &config, &path), config)
+}
+
+/// Way, task and poses of person 0 at a time.
+fn walker(actors: &Actors, index: usize) -> (&Person, &Walkway, Task) {
+    let person = &actors.people[index];
+    match &person.plan {
+        Plan::Walk(way, task) => (person, way, *task),
+        _ => unreachable!("person {index} does not walk"),
+    }
+}
+
+fn distance(a: &Isometry3<f32>, b: &Isometry3<f32>) -> f32 {
+    (a.translation.vector - b.translation.vector).norm()
+}
+
+#[test]
+fn a_carried_box_is_in_both_hands_never_jumps_and_stays_where_it_was_put_until_fetched() {
+    for seed in 1..4 {
+        let (actors, _) = actors(&format!("walking_static?seed={seed}&people=2&carry=on"));
+        let (person, way, task) = walker(&actors, 0);
+        assert_eq!(task, Task::Carry);
+        let dt = 1.0 / 30.0;
+        let frames: Vec<_> = (0..4500)
+            .map(|i| {
+                let time = f64::from(i) * dt;
+                let poses = person.poses(time);
+                let carried = tasks::carried_box(way, &way.at(time), &poses);
+                (carried, [0, 1].map(|side| skeleton::palm(&poses, &person.body.proportions, side)))
+            })
+            .collect();
+        let (mut lifted, mut landed, mut rest_places) = (0, 0, Vec::<Isometry3<f32>>::new());
+        for pair in frames.windows(2) {
+            let (before, (now, palms)) = (&pair[0].0, &pair[1]);
+            assert!(distance(before, now) < 0.08, "the box jumps by {} m", distance(before, now));
+            let on_floor = |pose: &Isometry3<f32>| pose.translation.z.abs() < 1e-5;
+            if !on_floor(now) {
+                lifted += 1;
+                for palm in palms {
+                    let local = now.inverse() * Point3::from(*palm);
+                    let gap = (local.x.abs() - BOX_M[0] / 2.0).abs();
+                    assert!(gap < 0.03 && local.y.abs() < 0.05, "a hand is at {local} of the box it carries");
+                }
+            } else if on_floor(before) {
+                assert!(distance(before, now) < 1e-6, "the box slides on the floor");
+                landed += 1;
+                if rest_places.iter().all(|place| distance(place, now) > 1e-4) {
+                    rest_places.push(*now);
+                }
+            }
+        }
+        assert!(lifted > 300 && landed > 300, "carried for {lifted}, left for {landed} frames");
+        assert_eq!(rest_places.len(), 2, "the box rests at two places");
+    }
+}
+
+#[test]
+fn a_pushed_chair_crosses_the_room_in_the_hands_of_its_pusher() {
+    let (actors, _) = actors("walking_static?seed=5&people=1&chair=on");
+    assert_eq!(CLASS_NAMES[actors.class(2) as usize], "chair");
+    let (person, way, task) = walker(&actors, 0);
+    assert_eq!(task, Task::Push);
+    let mut reached = [f32::INFINITY, f32::NEG_INFINITY];
+    for i in 0..1200 {
+        let time = f64::from(i) / 30.0;
+        let chair = tasks::chair(&way.at(time));
+        let poses = person.poses(time);
+        reached = [reached[0].min(chair.translation.x), reached[1].max(chair.translation.x)];
+        for side in [0, 1] {
+            let palm = skeleton::palm(&poses, &person.body.proportions, side);
+            let local = chair.inverse() * Point3::from(palm);
+            assert!((local - Point3::new(0.0, -0.25, 0.99)).norm() < 0.22, "a hand is at {local} of the chair");
+        }
+    }
+    assert!(reached[1] - reached[0] > 3.0, "the chair moves within {reached:?} only");
+}
+
+#[test]
+fn who_sits_touches_seat_and_floor_and_sinks_into_neither() {
+    for seed in 1..6 {
+        let (actors, config) = actors(&format!("sitting_static?seed={seed}&people=2&activity=crowd"));
+        let scene = Scene::new(config.scene, config.seed);
+        for (k, person) in actors.people.iter().enumerate() {
+            let seat = scene.seats[config.people - 1 - k].position;
+            let (mut sat, mut stood) = (0, 0);
+            for i in 0..600 {
+                let poses = person.poses(f64::from(i) / 30.0);
+                let p = &person.body.proportions;
+                let hips = poses[Bone::Pelvis.index()].translation.vector;
+                let sole = skeleton::lowest_sole(&poses, p);
+                assert!(sole.abs() < 0.035, "seed {seed}: the soles are {sole} m above the floor");
+                // The underside of pelvis and thighs is about 12 cm and 8 cm below their joints.
+                let above = hips.z - seat.z;
+                assert!(above > 0.08, "seed {seed}: the hips are {above} m above the seat");
+                if (hips - seat).xy().norm() < 0.002 {
+                    assert!(above < 0.12, "seed {seed}: floats {above} m above the seat");
+                    sat += 1;
+                }
+                stood += usize::from(above > 0.3);
+            }
+            assert!(sat > 100, "seed {seed}: person {k} sits for {sat} of 600 frames");
+            assert_eq!(stood > 100, k == 1, "seed {seed}: person {k} stands for {stood} of 600 frames");
+        }
+    }
+}
+
+#[test]
+fn the_foot_that_stands_slides_by_less_than_a_quarter_of_the_walking_speed() {
+    let (actors, _) = actors("walking_static?seed=3&people=2");
+    let (person, way, _) = walker(&actors, 1);
+    let (dt, mut slid, mut walked) = (1.0 / 120.0, 0.0, 0.0);
+    // Heel and ball of both feet; the lowest of them carries.
+    let soles = |time: f64| {
+        let poses = person.poses(time);
+        let at = |side, y| poses[Bone::Foot(side).index()] * Point3::new(0.0, y, -person.body.proportions.ankle());
+        [at(0, -0.05), at(0, 0.14), at(1, -0.05), at(1, 0.14)]
+    };
+    for i in 0..6000 {
+        let time = f64::from(i) * dt;
+        let speed = way.at(time).speed;
+        if speed < 0.7 {
+            continue;
+        }
+        let (now, then) = (soles(time), soles(time + dt));
+        let carries = (0..4).min_by(|&a, &b| now[a].z.total_cmp(&now[b].z)).unwrap();
+        slid += (then[carries] - now[carries]).xy().norm();
+        walked += (speed * dt) as f32;
+    }
+    assert!(walked > 5.0, "walked {walked} m only");
+    assert!(slid < 0.25 * walked, "the standing foot slides by {slid} m on {walked} m");
+}
+
+#[test]
+fn what_is_displaced_unseen_is_out_of_view_before_and_after_and_ends_elsewhere() {
+    let mut moved = 0;
+    for seed in 1..6 {
+        let (actors, config) = actors(&format!("walking_rpy?seed={seed}&people=0&moved=on&frames=600"));
+        let scene = Scene::new(config.scene, config.seed);
+        let path = CameraPath::new(&config, &scene);
+        let [(_, Motion::Displaced(box_))] = actors.things.as_slice() else { unreachable!("one thing") };
+        let places: Vec<_> = (0..600).map(|i| box_.at(f64::from(i) / 30.0)).collect();
+        let jumps: Vec<usize> = (1..600).filter(|&i| distance(&places[i - 1], &places[i]) > 0.0).collect();
+        assert!(jumps.len() <= 1, "displaced at {jumps:?}");
+        for jump in jumps {
+            moved += 1;
+            assert!(distance(&places[jump - 1], &places[jump]) > 0.3);
+            for i in [jump - 1, jump] {
+                let view = path.pose(i as f64 / 30.0).inverse();
+                assert!(!in_view(&config.camera, &view, &places[i].translation.vector, 0.2), "seen at frame {i}");
+            }
+        }
+    }
+    assert!(moved >= 3, "displaced in {moved} of 5 worlds");
+    let (still, _) = self::actors("walking_static?seed=1&people=0&moved=on");
+    let [(_, Motion::Displaced(box_))] = still.things.as_slice() else { unreachable!("one thing") };
+    assert_eq!(box_.at(0.0), box_.at(9.0), "a camera that never turns away sees every move");
+}
+
+#[test]
+fn nobody_walks_through_anybody() {
+    for spec in ["walking_xyz?seed=2&people=6&share=0.5", "walking_xyz?seed=3&people=4&robots=2&carry=on&chair=on"] {
+        let (mut actors, config) = actors(spec);
+        let scene = Scene::new(config.scene, config.seed);
+        for closeness in [0.3, 1.0, 2.0] {
+            actors.set_closeness(&scene, &config, closeness);
+            let ways: Vec<&Walkway> = (0..config.people).map(|k| walker(&actors, k).1).collect();
+            for i in 0..1200 {
+                let time = f64::from(i) / 10.0;
+                let places: Vec<[f64; 2]> = ways.iter().map(|way| way.at(time).position).collect();
+                for (a, b) in (0..places.len()).flat_map(|a| (0..a).map(move |b| (a, b))) {
+                    let gap = (places[a][0] - places[b][0]).hypot(places[a][1] - places[b][1]);
+                    assert!(gap > 0.3, "{spec}, closeness {closeness}: {a} and {b} are {gap} m apart at {time} s");
+                }
+            }
+        }
+    }
+}
