@@ -19,11 +19,12 @@ use slotmap::SecondaryMap;
 
 use crate::config::Config;
 use crate::geometry::Pose;
-use crate::map::{KeyFrameId, Map};
+use crate::map::{KeyFrame, KeyFrameId, Map};
 use crate::sensor::SensorModel;
-use crate::tracking::TrackedFrame;
+use crate::tracking::{Sight, TrackedFrame};
 use recognise::Candidate;
 pub use recognise::Recogniser;
+use verify::Evidence;
 
 /// A loop that was closed.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +39,8 @@ pub struct LoopClosed {
     pub drift: Pose,
 }
 
-/// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then.
+/// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then. Of several places that it may show
+/// the likeliest is taken.
 pub fn relocalise(
     recogniser: &mut Recogniser,
     sensor: &SensorModel,
@@ -48,7 +50,17 @@ pub fn relocalise(
 ) -> bool {
     let c = &config.places;
     let candidates = recogniser.candidates(c, map, &frame.features, |_| true);
-    candidates.iter().any(|place| verify::locate(sensor, config, map, place, frame, c.relocalise_min_inliers).is_some())
+    let needed = Evidence { inliers: c.relocalise_min_inliers, likeness: c.relocalise_min_likeness };
+    let mut best: Option<(f64, Pose, Vec<Option<Sight>>)> = None;
+    for place in &candidates {
+        let Some(evidence) = verify::locate(sensor, config, map, place, frame, &needed) else { continue };
+        if best.as_ref().is_none_or(|(likeness, ..)| evidence.likeness > *likeness) {
+            best = Some((evidence.likeness, frame.t_cam_world, frame.sights.clone()));
+        }
+    }
+    let Some((_, t_cam_world, sights)) = best else { return false };
+    (frame.t_cam_world, frame.sights) = (t_cam_world, sights);
+    true
 }
 
 /// Closes loops.
@@ -87,8 +99,9 @@ impl LoopCloser {
         let candidates =
             old_places(&mut recogniser.lock().unwrap_or_else(PoisonError::into_inner), config, map, keyframe);
         for place in self.consistent_ones(config, candidates) {
-            let found = verify::locate(sensor, config, map, &place, &mut self.frame, config.loops.min_inliers);
-            let Some(inliers) = found else { continue };
+            let needed = Evidence { inliers: config.loops.min_inliers, likeness: config.loops.min_likeness };
+            let found = verify::locate(sensor, config, map, &place, &mut self.frame, &needed);
+            let Some(Evidence { inliers, .. }) = found else { continue };
             let drift = estimated * self.frame.t_cam_world.inverse();
             correct::close(sensor, config, map, keyframe, &place, &self.frame);
             self.last_loop = Some(sequence);
@@ -115,15 +128,18 @@ impl LoopCloser {
     }
 }
 
-/// Places that resemble the keyframe and are not those it is connected with anyway.
+/// Places that resemble the keyframe and are not within two steps of covisibility, where tracking and mapping look anyway.
 fn old_places(recogniser: &mut Recogniser, config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<Candidate> {
     let Some(k) = map.keyframe(keyframe) else { return Vec::new() };
-    let near: Vec<KeyFrameId> = std::iter::once(keyframe).chain(k.covisible.iter().map(|(id, _)| *id)).collect();
+    let covisible = |k: &KeyFrame| k.covisible.iter().map(|(id, _)| (*id, ())).collect::<Vec<_>>();
+    let mut near: SecondaryMap<KeyFrameId, ()> = covisible(k).into_iter().chain([(keyframe, ())]).collect();
+    let first: Vec<KeyFrameId> = near.keys().collect();
+    near.extend(first.into_iter().filter_map(|id| map.keyframe(id)).flat_map(covisible));
     let mut local = SecondaryMap::new();
-    for (_, landmark) in near.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.sights()) {
+    for (_, landmark) in near.keys().filter_map(|id| map.keyframe(id)).flat_map(|k| k.sights()) {
         local.insert(landmark, ());
     }
     let mut candidates = recogniser.candidates(&config.places, map, &k.features, |id| !local.contains_key(id));
-    candidates.retain(|place| !near.contains(&place.keyframe));
+    candidates.retain(|place| !near.contains_key(place.keyframe));
     candidates
 }

@@ -10,22 +10,39 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use super::recognise::Candidate;
 use crate::config::{Config, PlaceConfig};
 use crate::geometry::{Pose, p3p};
-use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
 use crate::optimize::residual::Measurement;
 use crate::sensor::SensorModel;
 use crate::tracking::search::search_local_map;
 use crate::tracking::{Sight, TrackedFrame};
 
-/// Locates `frame` in the place of `candidate`. Returns the number of landmarks that fit the pose; pose and matches are then those of the
-/// frame. `None` if fewer than `min_inliers` fit.
+/// What speaks for a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evidence {
+    /// Landmarks that fit it.
+    pub inliers: usize,
+    /// Landmarks that fit it and look the same, as a share of what tracking would find there, going by how often it found each of those
+    /// in view. Corridors are alike in their doors and lamps: there many landmarks fit, but more are missing.
+    pub likeness: f64,
+}
+
+impl Evidence {
+    /// Whether there is as much of both as `needed`.
+    pub fn suffices(&self, needed: &Self) -> bool {
+        self.inliers >= needed.inliers && self.likeness >= needed.likeness
+    }
+}
+
+/// Locates `frame` in the place of `candidate`. Pose and matches are then those of the frame. `None` if the evidence is less than
+/// `needed`.
 pub fn locate(
     sensor: &SensorModel,
     config: &Config,
     map: &Map,
     candidate: &Candidate,
     frame: &mut TrackedFrame,
-    min_inliers: usize,
-) -> Option<usize> {
+    needed: &Evidence,
+) -> Option<Evidence> {
     let c = &config.places;
     let pairs: Vec<Pair> = candidate.matches.iter().filter_map(|m| Pair::new(sensor, map, frame, *m)).collect();
     let pose = ransac(sensor, c, &pairs)?;
@@ -35,7 +52,7 @@ pub fn locate(
         frame.sights[pair.feature] = Some(Sight { landmark: Some(pair.landmark), point_world: pair.point_world });
     }
     let mut inliers = frame.refine_pose(sensor, &config.pose);
-    let mut visible = Vec::new();
+    let (mut visible, mut expected) = (Vec::new(), 0.0);
     // The second search starts from a better pose.
     for _ in 0..2 {
         if inliers < c.min_refined_inliers {
@@ -43,9 +60,18 @@ pub fn locate(
         }
         let landmarks = unmatched_landmarks(map, &candidate.group, frame);
         search_local_map(sensor, &config.tracking, map, &landmarks, frame, &mut visible);
+        visible.extend(frame.sights.iter().flatten().filter_map(|sight| sight.landmark));
+        visible.sort_unstable();
+        visible.dedup();
+        expected = visible.iter().filter_map(|id| map.landmark(*id)).map(Landmark::found_ratio).sum();
         inliers = frame.refine_pose(sensor, &config.pose);
     }
-    (inliers >= min_inliers).then_some(inliers)
+    let alike = frame.sights.iter().zip(&frame.features.descriptors).filter(|(sight, seen)| {
+        let landmark = sight.and_then(|s| map.landmark(s.landmark?));
+        landmark.is_some_and(|l| l.descriptor.distance(seen) <= c.max_distance)
+    });
+    let evidence = Evidence { inliers, likeness: alike.count() as f64 / expected.max(1.0) };
+    evidence.suffices(needed).then_some(evidence)
 }
 
 /// Landmarks that the keyframes see and the frame is not matched to.

@@ -38,6 +38,11 @@ pub struct Landmark {
 }
 
 impl Landmark {
+    /// Of the frames that should have seen it, the share that did.
+    pub fn found_ratio(&self) -> f64 {
+        f64::from(self.found) / f64::from(self.visible.max(1))
+    }
+
     /// Feature index in a keyframe, if it sees the landmark.
     pub fn feature_in(&self, keyframe: KeyFrameId) -> Option<usize> {
         self.observations.iter().find(|(k, _)| *k == keyframe).map(|(_, f)| *f as usize)
