@@ -43,10 +43,12 @@ impl Window {
 
     /// Copies the whole map; all keyframes but the first are adjusted.
     pub fn whole(sensor: &SensorModel, map: &Map) -> Self {
-        let mut keyframes: Vec<KeyFrameId> =
-            map.keyframes().filter(|(_, k)| k.sequence > 0).map(|(id, _)| id).collect();
-        let free_poses = keyframes.len();
-        keyframes.extend(map.keyframes().filter(|(_, k)| k.sequence == 0).map(|(id, _)| id));
+        // In the order of time, in which the equations are nearly a band; the first keyframe, which stays, goes last.
+        let mut keyframes: Vec<(u64, KeyFrameId)> =
+            map.keyframes().map(|(id, k)| (k.sequence.wrapping_sub(1), id)).collect();
+        keyframes.sort_unstable();
+        let free_poses = keyframes.iter().filter(|(order, _)| *order < u64::MAX).count();
+        let keyframes = keyframes.into_iter().map(|(_, id)| id).collect();
         let landmarks = map.landmarks().map(|(id, _)| id).collect();
         Self::assemble(sensor, map, keyframes, free_poses, landmarks)
     }

@@ -2,9 +2,11 @@
 //! 2000, section 6.1).
 //!
 //! In: a copied window of poses, points and observations. Out: the same, refined. Points are eliminated first; what is left
-//! is a dense symmetric system over the free poses, six unknowns each, small enough for dense Cholesky.
+//! is a symmetric system over the free poses, six unknowns each, for dense Cholesky or, if they are many, sparse.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
+use nalgebra_sparse::CscMatrix;
+use nalgebra_sparse::factorization::CscCholesky;
 
 use crate::config::BundleConfig;
 use crate::geometry::{Pinhole, Pose, perturbed, skew};
@@ -132,6 +134,9 @@ impl BundleProblem {
 /// Closer than this a point has no usable projection, m.
 const MIN_DEPTH_M: f64 = 1e-3;
 
+/// Unknowns of the reduced system up to which it is solved as a dense one.
+const DENSE_LIMIT: usize = 600;
+
 /// The blocks of JᵀWJ and JᵀWr, and scratch for the reduced system.
 struct NormalEquations {
     pose_blocks: Vec<Matrix6<f64>>,
@@ -211,6 +216,21 @@ impl NormalEquations {
         }
     }
 
+    /// The poses' part of the step. Few poses see points of each other almost all, many do not: above a limit the zeros pay.
+    fn solve_reduced(&mut self) -> Option<DVector<f64>> {
+        let size = self.reduced_rhs.len();
+        if size == 0 {
+            return Some(DVector::zeros(0));
+        }
+        if size <= DENSE_LIMIT {
+            let reduced = std::mem::replace(&mut self.reduced, DMatrix::zeros(size, size));
+            return Some(reduced.cholesky()?.solve(&self.reduced_rhs));
+        }
+        self.reduced.fill_upper_triangle_with_lower_triangle();
+        let factor = CscCholesky::factor(&CscMatrix::from(&self.reduced)).ok()?;
+        Some(factor.solve(&self.reduced_rhs).column(0).into_owned())
+    }
+
     /// Solves the damped system; `None` if it is not positive definite.
     fn step(&mut self, problem: &BundleProblem, lambda: f64) -> Option<(Vec<Pose>, Vec<Point3<f64>>)> {
         let n = problem.free_poses;
@@ -254,11 +274,7 @@ impl NormalEquations {
                 }
             }
         }
-        let solution = if n > 0 {
-            std::mem::replace(&mut self.reduced, DMatrix::zeros(6 * n, 6 * n)).cholesky()?.solve(&self.reduced_rhs)
-        } else {
-            DVector::zeros(0)
-        };
+        let solution = self.solve_reduced()?;
         let mut poses = problem.poses.clone();
         for (k, pose) in poses.iter_mut().take(n).enumerate() {
             *pose = perturbed(&solution.fixed_rows::<6>(6 * k).into(), pose);
@@ -352,6 +368,31 @@ mod tests {
         for (a, b) in truth.poses.iter().zip(&problem.poses) {
             assert!((a.inverse() * b).translation.vector.norm() < 1e-6);
         }
+    }
+
+    #[test]
+    fn many_poses_are_solved_for_as_few_are() {
+        let poses = vec![Pose::identity(); DENSE_LIMIT / 6 + 1];
+        let (camera, free_poses) = (scene(0.0).0.camera, poses.len());
+        let mut system = NormalEquations::new(&BundleProblem {
+            camera,
+            poses,
+            free_poses,
+            points: Vec::new(),
+            observations: Vec::new(),
+        });
+        let size = 6 * free_poses;
+        let near = |i: usize, j: usize| i.abs_diff(j) < 20 || i.abs_diff(j) > size - 10;
+        let full = DMatrix::from_fn(size, size, |i, j| match (i == j, near(i, j)) {
+            (true, _) => 50.0 + (i % 7) as f64,
+            (false, true) => 1.0 / (1.0 + (i * j % 11 + i + j) as f64),
+            (false, false) => 0.0,
+        });
+        // Only the lower triangle is filled when points are eliminated.
+        system.reduced = full.lower_triangle();
+        system.reduced_rhs = DVector::from_fn(size, |i, _| (i % 13) as f64 - 6.0);
+        let solution = system.solve_reduced().unwrap();
+        assert!((full * solution - &system.reduced_rhs).amax() < 1e-9);
     }
 
     #[test]
