@@ -1,7 +1,7 @@
 """Folders of pictures in, one array of equal squares out, so that training decodes nothing.
 
     python -m train.cache yolo  PHOTOS  CACHE --classes person      # PHOTOS/images/*, PHOTOS/labels/*.txt: class cx cy w h, relative
-    python -m train.cache synth FOLDER  CACHE                       # pictures with boxes.json, as `yfslam synth` writes them
+    python -m train.cache synth FOLDER  CACHE --classes person chair  # recordings that `yfslam synth` wrote, at any depth below
 
 CACHE/images.npy: uint8 [N, 352, 352, 3], blue green red, stretched. CACHE/labels.npz: boxes [M, 5] (class, x0, y0, x1, y1; relative),
 first box of each picture [N + 1], group [N], held_out [N], and the class names.
@@ -29,6 +29,22 @@ def yolo_folder(folder, classes):
         rows = np.array([line.split()[:5] for line in text.splitlines() if line.strip()], np.float32).reshape(-1, 5)
         kind, x, y, w, h = rows.T
         yield path, np.stack([kind, x - w / 2, y - h / 2, x + w / 2, y + h / 2], 1)
+
+
+def synthetic_folders(folder, classes):
+    """Yields (path, boxes) of every recording of `yfslam synth` below `folder`."""
+    for about in sorted(folder.glob("**/boxes.json")):
+        frames = json.loads(about.read_text())["frames"]
+        stamps = {round(frame["timestamp_ns"] / 1e3): frame["boxes"] for frame in frames}
+        for line in (about.parent / "rgb.txt").read_text().splitlines():
+            if not line.strip() or line.startswith("#"):
+                continue
+            stamp, file = line.split()[:2]
+            path = about.parent / file
+            height, width = cv2.imread(str(path), cv2.IMREAD_COLOR).shape[:2]
+            boxes = stamps.get(round(float(stamp) * 1e6), [])
+            rows = [[classes.index(b["class"]), *np.array(b["bbox"]) / (width, height, width, height)] for b in boxes if b["class"] in classes]
+            yield path, np.array(rows, np.float32).reshape(-1, 5)
 
 
 def groups(thumbnails):
@@ -88,13 +104,14 @@ def write(pictures, classes, out, share):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("form", choices=["yolo"])
+    parser.add_argument("form", choices=["yolo", "synth"])
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("cache", type=pathlib.Path)
-    parser.add_argument("--classes", nargs="+", default=["person"], help="names of the class numbers in the label files")
+    parser.add_argument("--classes", nargs="+", default=["person"], help="names of the class numbers in the label files; of synthetic folders: the classes to keep")
     parser.add_argument("--hold-out", type=float, default=0.15, help="share of the scenes that is never trained on")
     options = parser.parse_args()
-    write(yolo_folder(options.folder, options.classes), options.classes, options.cache, options.hold_out)
+    read = {"yolo": yolo_folder, "synth": synthetic_folders}[options.form]
+    write(read(options.folder, options.classes), options.classes, options.cache, options.hold_out)
 
 
 if __name__ == "__main__":

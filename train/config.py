@@ -15,6 +15,6 @@ class Config:
     warm_up: int = 400  # steps
     average: float = 0.9995  # of the moving average of the weights, per step
     # [from this sample on, sides of training pictures, px]: small ones first, they teach more per second (progressive resizing)
-    sides: list = dataclasses.field(default_factory=lambda: [[0, [192, 224, 256]]])
+    sides: list = dataclasses.field(default_factory=lambda: [[0, [160, 192, 224]], [160000, [192, 224, 256, 288]]])
     mosaic: float = 0.35  # share of pictures that are put together from four
     strength: float = 1.0  # of the turning, 0 to 1

@@ -48,24 +48,27 @@ def halve(graph):
             tensor.CopyFrom(onnx.numpy_helper.from_array(values, tensor.name))
 
 
+def write(checkpoint, out, half):
+    model, config = load(checkpoint)
+    torch.onnx.export(fold(model), (torch.zeros(1, 3, SIDE, SIDE),), out, input_names=["input"], output_names=NAMES, opset_version=13,
+                      dynamo=False)
+    exported = onnx.load(out)
+    for key in ("classes", "anchors"):
+        exported.metadata_props.add(key={"classes": "names"}.get(key, key), value=json.dumps(config[key]))
+    if half:
+        halve(exported.graph)
+    onnx.checker.check_model(exported)
+    onnx.save(exported, out)
+    print(f"{out}: {out.stat().st_size} bytes, classes {config['classes']}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("checkpoint", type=pathlib.Path)
     parser.add_argument("onnx", type=pathlib.Path)
     parser.add_argument("--half", action="store_true", help="round the weights to float16")
     options = parser.parse_args()
-    model, config = load(options.checkpoint)
-    model = fold(model)
-    torch.onnx.export(model, (torch.zeros(1, 3, SIDE, SIDE),), options.onnx, input_names=["input"], output_names=NAMES,
-                      opset_version=13, dynamo=False)
-    exported = onnx.load(options.onnx)
-    for key, value in (("names", json.dumps(config["classes"])), ("anchors", json.dumps(config["anchors"]))):
-        exported.metadata_props.add(key=key, value=value)
-    if options.half:
-        halve(exported.graph)
-    onnx.checker.check_model(exported)
-    onnx.save(exported, options.onnx)
-    print(f"{options.onnx}: {options.onnx.stat().st_size} bytes, classes {config['classes']}")
+    write(options.checkpoint, options.onnx, options.half)
 
 
 if __name__ == "__main__":

@@ -60,10 +60,10 @@ def rate(config, step, seen, decay):
 
 @torch.no_grad()
 def average(target, model, weight):
-    for a, b in zip(target.state_dict().values(), model.state_dict().values()):
-        if a.dtype.is_floating_point:
-            a.lerp_(b, 1 - weight)
-        else:
+    own, new = list(target.state_dict().values()), list(model.state_dict().values())
+    torch._foreach_lerp_([a for a in own if a.is_floating_point()], [b for b in new if b.is_floating_point()], 1 - weight)
+    for a, b in zip(own, new):
+        if not a.is_floating_point():
             a.copy_(b)
 
 
@@ -122,7 +122,7 @@ def train(rank, world, options):
     torch.manual_seed(config.seed)
     model = YoloFastestV2(len(config.classes)).to(memory_format=torch.channels_last)
     mean = copy.deepcopy(model)
-    optimizer = torch.optim.AdamW(parameter_groups(model, config.weight_decay), lr=config.rate)
+    optimizer = torch.optim.AdamW(parameter_groups(model, config.weight_decay), lr=config.rate, fused=True)
     step = seen = 0
     if state:
         same = len(state["model"]["cls.bias"]) == len(config.classes)

@@ -29,7 +29,8 @@ class Unit(nn.Module):
         self.main = nn.Sequential(*conv(half, half), *conv(half, half, 3, groups=half, relu=False), *conv(half, half))
 
     def forward(self, x):
-        return torch.cat([x[:, 0::2], self.main(x[:, 1::2])], 1)
+        odd = x[:, 1::2].contiguous(memory_format=torch.channels_last)  # a fifth of the time of training
+        return torch.cat([x[:, 0::2], self.main(odd)], 1)
 
 
 class Down(nn.Module):
