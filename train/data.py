@@ -13,13 +13,15 @@ MOST_BOXES = 24  # per picture
 
 
 class Cache:
-    """One cached source; `classes` is the network's list, boxes of other classes are dropped."""
+    """One cached source; `classes` is the network's list, boxes of other classes are dropped. `labelled`: 1 for each class of the network
+    that the cache has labels of."""
 
     def __init__(self, folder, classes, held_out=False):
         folder = pathlib.Path(folder)
         self.images = np.load(folder / "images.npy", mmap_mode="r")
         labels = np.load(folder / "labels.npz")
         names = [str(name) for name in labels["classes"]]
+        self.labelled = np.array([name in names for name in classes], np.float32)
         number = np.array([classes.index(name) if name in classes else -1 for name in names])
         first = labels["first"]
         self.chosen = np.flatnonzero(labels["held_out"] == held_out)
@@ -47,21 +49,19 @@ class Samples(torch.utils.data.Dataset):
     def __init__(self, caches, shares, seed):
         self.caches, self.shares, self.seed = caches, np.cumsum(np.array(shares) / np.sum(shares)), seed
 
-    def draw(self, rng):
-        which = min(int(np.searchsorted(self.shares, rng.random())), len(self.caches) - 1)
-        return self.caches[which].draw(rng)
-
     def __getitem__(self, item):
         number, side, mosaic, strength = item
         rng = np.random.default_rng([self.seed, number])
-        image, boxes, ignored = augment.sample(rng, self.draw, side, mosaic, strength)
+        # all parts of a mosaic come from one cache, so that one list of labelled classes holds for the picture
+        cache = self.caches[min(int(np.searchsorted(self.shares, rng.random())), len(self.caches) - 1)]
+        image, boxes, ignored = augment.sample(rng, cache.draw, side, mosaic, strength)
         targets = np.full((MOST_BOXES, 5), -1, np.float32)
         order = np.argsort(-(boxes[:, 3] - boxes[:, 1]) * (boxes[:, 4] - boxes[:, 2]), kind="stable")[:MOST_BOXES]
         targets[:len(order)] = boxes[order]
         mask = np.zeros((side // 16, side // 16), np.uint8)
         for x0, y0, x1, y1 in ignored / 16:
             mask[int(y0):int(np.ceil(y1)), int(x0):int(np.ceil(x1))] = 1
-        return torch.from_numpy(image), torch.from_numpy(targets), torch.from_numpy(mask)
+        return torch.from_numpy(image), torch.from_numpy(targets), torch.from_numpy(mask), torch.from_numpy(cache.labelled)
 
 
 def start_worker(_):

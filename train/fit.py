@@ -146,13 +146,13 @@ def train(rank, world, options):
     saved = told = time.time()
     sums, count = torch.zeros(len(PARTS)), 0
     next_evaluation = seen + options.every
-    for images, targets, ignored in data.loader(samples, batches, 1):
+    for images, targets, ignored, labelled in data.loader(samples, batches, 1):
         model.train()
         factor = rate(config, step, seen, decay)
         for group in optimizer.param_groups:
             group["lr"] = config.rate * factor
         images = images.permute(0, 3, 1, 2).float().div_(255)
-        loss, parts = detection_loss(model(images), targets, ignored, anchors, images.shape[-1])
+        loss, parts = detection_loss(model(images), targets, ignored, labelled, anchors, images.shape[-1])
         optimizer.zero_grad(set_to_none=True)
         loss.backward()
         if world > 1:

@@ -107,8 +107,21 @@ def assign(boxes, objects, classes, targets, anchors, side):
     return picture[keep], anchor[keep], box[keep]
 
 
-def detection_loss(outputs, targets, ignored, anchors, side):
-    """Loss and its parts (boxes, objectness, classes, mean IoU, pairs per picture). targets [B, T, 5], class -1: none."""
+def object_terms(objects, classes, truth, labelled):
+    """Binary cross-entropy of each anchor [B, A]. Where a picture has no labels of some class, an anchor that is empty according to the
+    labels may hold a thing of that class: only its probability of holding a labelled one, objectness times the share of the labelled
+    classes [B, C], is pushed to zero; -log(1 - s p) = softplus(o) - softplus(o + log(1 - p)) with s the sigmoid of o."""
+    terms = F.binary_cross_entropy_with_logits(objects, truth, reduction="none")
+    if labelled.all():
+        return terms
+    share = (classes.detach().softmax(-1) * labelled[:, None]).sum(-1)
+    spared = F.softplus(objects + (1 - share).clamp(min=1e-12).log())
+    return torch.where(truth > 0, terms, terms - spared)
+
+
+def detection_loss(outputs, targets, ignored, labelled, anchors, side):
+    """Loss and its parts (boxes, objectness, classes, mean IoU, pairs per picture). targets [B, T, 5], class -1: none; `ignored`
+    [B, side / 16, side / 16]: 1 where nothing is to be learnt; labelled [B, C]: 1 for the classes that the picture has labels of."""
     boxes, objects, classes = flatten(outputs, anchors)
     picture, anchor, box = assign(boxes, objects, classes, targets, anchors, side)
     pairs = max(len(picture), 1)
@@ -119,7 +132,7 @@ def detection_loss(outputs, targets, ignored, anchors, side):
     coarse = F.max_pool2d(ignored[:, None].float(), 2, ceil_mode=True)[:, 0]
     weight = 1 - torch.cat([mask.flatten(1).float().repeat(1, ANCHORS_PER_GRID) for mask in (ignored, coarse)], 1)
     weight[picture, anchor] = 1
-    object_loss = (F.binary_cross_entropy_with_logits(objects, truth, reduction="none") * weight).sum() / pairs
+    object_loss = (object_terms(objects, classes, truth, labelled) * weight).sum() / pairs
     class_loss = F.cross_entropy(classes[picture, anchor], targets[picture, box, 0].long(), reduction="sum") / pairs
     total = BOX_WEIGHT * box_loss + object_loss + class_loss
     parts = [box_loss, object_loss, class_loss, overlap.sum() / pairs, len(picture) / len(targets)]

@@ -11,7 +11,7 @@ import torch
 from . import augment, cache, export, fit
 from .config import Config
 from .decode import decode
-from .loss import assign, detection_loss, flatten
+from .loss import assign, detection_loss, flatten, object_terms
 from .metrics import match, summary
 from .model import YoloFastestV2
 
@@ -54,12 +54,19 @@ def the_loss_falls_on_one_batch():
     optimizer = torch.optim.AdamW(model.parameters(), lr=2e-3)
     losses = []
     for _ in range(40):
-        loss, parts = detection_loss(model(images), targets, torch.zeros(4, 6, 6), anchors, 96)
+        loss, parts = detection_loss(model(images), targets, torch.zeros(4, 6, 6), torch.ones(4, 1), anchors, 96)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
         losses.append(loss.item())
     assert losses[-1] < 0.4 * losses[0], losses
+
+
+def unlabelled_classes_are_not_background():
+    objects, truth = torch.tensor([[2.0, 2.0]], requires_grad=True), torch.zeros(1, 2)
+    classes = torch.tensor([[[9.0, -9.0], [-9.0, 9.0]]])  # a person, a chair
+    object_terms(objects, classes, truth, torch.tensor([[1.0, 0.0]])).sum().backward()
+    assert objects.grad[0, 0] > 0.8 and objects.grad[0, 1].abs() < 1e-6
 
 
 def turned_boxes_bound_the_ellipse():
