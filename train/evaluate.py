@@ -5,7 +5,7 @@
 MODEL: a checkpoint (.pt) or an ONNX file with six raw maps (anchors from its metadata, else those of COCO; `person` must be one of
 its classes). On the held-out pictures of CACHE: AP50 of people, recall and precision at score 0.3, upright and turned by 30, 60 and
 90 degrees to either side. With the folder of development data: how often everyone in sight is covered on
-labels/bonn_crowd_dev_100.json, and how many people are reported on tum_fr1_xyz_dev.
+labels/bonn_crowd_dev_100.json, and how many people are wrongly reported on tum_fr1_xyz_dev.
 """
 
 import argparse
@@ -20,6 +20,7 @@ from .decode import blob, decode, iou
 from .metrics import summary
 
 COCO_ANCHORS = [12.64, 19.39, 37.88, 51.48, 55.71, 138.31, 126.91, 78.23, 131.57, 214.55, 279.92, 258.87]
+MAN_IN_SIGHT = [(0, 8), (52, 103), (143, 232), (283, 299)]  # frames of tum_fr1_xyz_dev
 LABELS = pathlib.Path(__file__).parent / "labels"
 
 
@@ -104,15 +105,16 @@ def crowd(network, data, score=0.3):
 
 
 def false_alarms(network, data, score=0.3):
-    """People reported per frame of a desk. A man sits behind it, at the upper edge of many frames and never below the middle: boxes whose
-    centre lies in the lower half are false for certain, of the others some are right."""
+    """People reported per frame of a desk. A man sits behind it: in some frames a box with its centre in the upper left may be him and is
+    not counted as false."""
     files = sorted((data / "rgbd/tum_fr1_xyz_dev/rgb").iterdir())
     total = false = 0
-    for file in files:
+    for number, file in enumerate(files):
         boxes, scores = network(cv2.imread(str(file)))
-        boxes = boxes[scores > score]
-        total, false = total + len(boxes), false + int((boxes[:, 1] + boxes[:, 3] > 1).sum())
-    return {"frames": len(files), "reported_per_frame": total / len(files), "surely_false_per_frame": false / len(files)}
+        x, y = (boxes[scores > score].reshape(-1, 2, 2).mean(1)).T
+        him = any(first <= number <= last for first, last in MAN_IN_SIGHT) & (x < 0.62) & (y < 0.36)
+        total, false = total + len(x), false + int((~him).sum())
+    return {"frames": len(files), "reported_per_frame": total / len(files), "false_per_frame": false / len(files)}
 
 
 def report(network, cache, data):
