@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 
 SIDE = 352
+LEAST_SEEN = 0.12  # share of its box that must show the thing
 SAME_SCENE = 0.85  # correlation of 16 x 16 grey thumbnails, in the best of eight orientations
 
 
@@ -32,18 +33,22 @@ def yolo_folder(folder, classes):
 
 
 def synthetic_folders(folder, classes):
-    """Yields (path, boxes) of every recording of `yfslam synth` below `folder`."""
+    """Yields (path, boxes) of every recording of `yfslam synth` below `folder`. Things of which others leave little to see are left out."""
     for about in sorted(folder.glob("**/boxes.json")):
-        frames = json.loads(about.read_text())["frames"]
-        stamps = {round(frame["timestamp_ns"] / 1e3): frame["boxes"] for frame in frames}
+        stamps = {round(frame["timestamp_ns"] / 1e3): frame["boxes"] for frame in json.loads(about.read_text())["frames"]}
         for line in (about.parent / "rgb.txt").read_text().splitlines():
             if not line.strip() or line.startswith("#"):
                 continue
             stamp, file = line.split()[:2]
             path = about.parent / file
-            height, width = cv2.imread(str(path), cv2.IMREAD_COLOR).shape[:2]
-            boxes = stamps.get(round(float(stamp) * 1e6), [])
-            rows = [[classes.index(b["class"]), *np.array(b["bbox"]) / (width, height, width, height)] for b in boxes if b["class"] in classes]
+            mask = cv2.imread(str(about.parent / "masks" / f"{stamp}.png"), cv2.IMREAD_UNCHANGED)
+            size = np.array([mask.shape[1], mask.shape[0]] * 2)
+            rows = []
+            for box in stamps.get(round(float(stamp) * 1e6), []):
+                x0, y0, x1, y1 = box["bbox"]
+                seen = (mask == box["instance"]).sum()
+                if box["class"] in classes and seen > LEAST_SEEN * max((x1 - x0) * (y1 - y0), 0.01 * mask.size):
+                    rows.append([classes.index(box["class"]), *np.array(box["bbox"]) / size])
             yield path, np.array(rows, np.float32).reshape(-1, 5)
 
 
