@@ -15,13 +15,14 @@ import os
 import pathlib
 import time
 
+import cv2
 import numpy as np
 import torch
 import torch.distributed as dist
 
 from . import data
 from .config import Config
-from .decode import decode
+from .decode import SIDE, decode
 from .loss import detection_loss
 from .metrics import summary
 from .model import YoloFastestV2
@@ -35,11 +36,13 @@ class Batches:
     def __init__(self, config, start, stop, sides, rank, world):
         self.config, self.start, self.stop, self.sides, self.rank, self.world = config, start, stop, sides, rank, world
 
+    def sides_at(self, seen):
+        return self.sides or [sides for begin, sides in self.config.sides if begin <= seen][-1]
+
     def __iter__(self):
         c = self.config
         for first in range(self.start, self.stop, c.batch):
-            sides = self.sides or [sides for begin, sides in c.sides if begin <= first][-1]
-            side = int(np.random.default_rng([c.seed, first, 7]).choice(sides))
+            side = int(np.random.default_rng([c.seed, first, 7]).choice(self.sides_at(first)))
             yield [(n, side, c.mosaic, c.strength) for n in range(first, first + c.batch)][self.rank::self.world]
 
 
@@ -76,13 +79,15 @@ def share_gradients(model, world):
 
 
 @torch.no_grad()
-def evaluate(model, cache, config, wanted=0):
-    """Metrics of class `wanted` on the pictures of `cache`."""
+def evaluate(model, cache, config, side, wanted=0):
+    """Metrics of class `wanted` on the pictures of `cache`, at `side` px."""
     model.eval()
     found, truths = [], []
     for index in cache.chosen:
-        image = torch.from_numpy(np.array(cache.images[index])).permute(2, 0, 1)[None].float() / 255
-        outputs = model(image.contiguous(memory_format=torch.channels_last))
+        image = np.array(cache.images[index])
+        if side != image.shape[0]:
+            image = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA)
+        outputs = model(torch.from_numpy(image).permute(2, 0, 1)[None].float() / 255)
         found.append(decode([o.numpy() for o in outputs], config.anchors, wanted, least=0.01))
         rows = cache.boxes[index]
         truths.append(rows[rows[:, 0] == wanted][:, 1:])
@@ -169,10 +174,12 @@ def train(rank, world, options):
         if rank == 0 and (seen >= next_evaluation or seen >= stop):
             next_evaluation += options.every
             speed = count * config.batch / (time.time() - told)
-            scores = evaluate(mean, held_out, config)
+            side = int(np.median(batches.sides_at(seen)) / 32) * 32  # a network trained on small pictures is at home there
+            small, scores = evaluate(mean, held_out, config, side), evaluate(mean, held_out, config, SIDE)
             row = {"time": time.strftime("%H:%M:%S"), "branch": out.stem, "samples": seen, "rate": f"{config.rate * factor:.5f}",
                    **{name: f"{value:.4f}" for name, value in zip(PARTS, (sums / count).tolist())},
-                   **{name: f"{scores[name]:.4f}" for name in ("AP50", "recall", "precision", "tall_recall")}, "per_second": f"{speed:.1f}"}
+                   **{name: f"{scores[name]:.4f}" for name in ("AP50", "recall", "precision", "tall_recall")},
+                   "side": side, "AP50_at_side": f"{small['AP50']:.4f}", "tall_recall_at_side": f"{small['tall_recall']:.4f}", "per_second": f"{speed:.1f}"}
             fresh = not (options.run / "log.csv").exists()
             with open(options.run / "log.csv", "a", newline="") as file:
                 writer = csv.DictWriter(file, row)
