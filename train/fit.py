@@ -167,7 +167,7 @@ def train(rank, world, options):
         step, seen = step + 1, seen + config.batch
         average(mean, model, min(config.average, step / (step + 10)))
         sums, count = sums + parts, count + 1
-        if rank == 0 and (seen >= next_evaluation or seen >= stop or time.time() - saved > 300):
+        if rank == 0 and (seen >= next_evaluation or seen >= stop or time.time() - saved > 120):
             save(out, model=model.state_dict(), mean=mean.state_dict(), optimizer=optimizer.state_dict(), step=step, seen=seen,
                  config=dataclasses.asdict(config))
             saved = time.time()
