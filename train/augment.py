@@ -1,0 +1,137 @@
+"""Pictures and boxes in, one altered training picture out; every draw comes from the generator that is passed in.
+
+Geometry is one affine warp per picture (stretch, turn, mirror, zoom, shift), so nothing is interpolated twice. A turned box is
+bounded by its inscribed ellipse, not by its corners: people fill the ellipse, and corners would make boxes up to 40 % too large.
+A mosaic (Bochkovskiy et al., 2020) fills four parts of the canvas with four pictures.
+"""
+
+import cv2
+import numpy as np
+
+VISIBLE = 0.15  # of a cut person's box must remain for it to count; below, its place teaches nothing
+LEAST_SIDE = 9.0  # px
+
+
+def angle(rng):
+    """Camera roll, degrees: mostly upright, often up to 45, at times up to 100."""
+    kind = rng.random()
+    if kind < 0.5:
+        return rng.normal(0, 5)
+    return rng.uniform(-45, 45) if kind < 0.8 else rng.uniform(-100, 100)
+
+
+def matrix(rng, boxes, source, width, height, zoom, theta):
+    """The affine map from a `source` px square picture onto a width x height canvas."""
+    scale = zoom * np.sqrt(width * height) / source
+    before, after = np.exp(rng.uniform(-0.25, 0.35)), np.exp(rng.uniform(-0.4, 0.2))
+    cos, sin = np.cos(np.radians(theta)), np.sin(np.radians(theta))
+    flip = 1.0 if rng.random() < 0.5 else -1.0
+    turn = np.array([[cos, -sin], [sin, cos]])
+    linear = scale * np.diag([after**0.5, after**-0.5]) @ turn @ np.diag([flip * before**0.5, before**-0.5])
+    # a point of the picture, mostly one of a person, goes to a random point of the canvas: people cut by every edge
+    anchor = rng.uniform(0, source, 2)
+    if len(boxes) and rng.random() < 0.7:
+        x0, y0, x1, y1 = boxes[rng.integers(len(boxes)), 1:5] * source
+        anchor = np.array([rng.uniform(x0, x1), rng.uniform(y0, y1)])
+    size = np.array([width, height], float)
+    shift = rng.uniform(0, 1, 2) * size - linear @ anchor
+    # no needless border: a picture larger than the canvas covers it, a smaller one lies within
+    corners = linear @ (np.array([[0, 1, 0, 1], [0, 0, 1, 1]]) * source)
+    low, high = corners.min(1), corners.max(1)
+    bounds = np.sort(np.stack([-low, size - high]), axis=0)
+    shift = np.clip(shift, bounds[0], bounds[1])
+    return np.column_stack([linear, shift])
+
+
+def place(boxes, affine, source, region):
+    """Boxes on the canvas, cut at `region` (x0, y0, x1, y1), and the places to ignore: what is left of people nearly outside."""
+    if not len(boxes):
+        return boxes.reshape(0, 5), np.zeros((0, 4))
+    centre = (boxes[:, 1:3] + boxes[:, 3:5]) / 2 * source @ affine[:, :2].T + affine[:, 2]
+    half = (boxes[:, 3:5] - boxes[:, 1:3]) / 2 * source
+    reach = np.sqrt(half**2 @ (affine[:, :2] ** 2).T)
+    whole = np.concatenate([centre - reach, centre + reach], 1)
+    low, high = np.maximum(whole[:, :2], region[:2]), np.minimum(whole[:, 2:], region[2:])
+    sides = np.maximum(high - low, 0)
+    left = sides.prod(1) / (whole[:, 2:] - whole[:, :2]).prod(1)
+    inside = sides.min(1) > 0
+    good = inside & (left > VISIBLE) & (sides.min(1) > LEAST_SIDE)
+    cut = np.concatenate([low, high], 1)
+    return np.column_stack([boxes[good, 0], cut[good]]), cut[inside & ~good]
+
+
+def colour(rng, image):
+    """Exposure, contrast, white balance, saturation and hue as one linear map, then a gamma curve."""
+    grey = np.full((3, 3), 1.0) * np.array([0.114, 0.587, 0.299])
+    saturation = 0.0 if rng.random() < 0.06 else np.exp(rng.uniform(-0.7, 0.4))
+    mix = saturation * np.eye(3) + (1 - saturation) * grey
+    hue = rng.uniform(-0.15, 0.15) * np.array([[0, 1, -1], [-1, 0, 1], [1, -1, 0]])
+    gains = np.exp(rng.normal(0, 0.07, 3) + rng.normal(-0.05, 0.2))
+    linear = np.diag(gains) @ (mix + saturation * hue)
+    contrast = np.exp(rng.normal(0, 0.15))
+    offset = (1 - contrast) * 128 + rng.normal(0, 8)
+    image = cv2.transform(image, np.column_stack([linear * contrast, np.full(3, offset)]).astype(np.float32))
+    if rng.random() < 0.4:
+        curve = 255 * (np.arange(256) / 255) ** np.exp(rng.normal(0, 0.3))
+        image = cv2.LUT(image, curve.astype(np.uint8))
+    return image
+
+
+def spoil(rng, image):
+    """What a cheap moving camera adds: blur of motion and focus, coarse pixels, noise, JPEG."""
+    kind = rng.random()
+    if kind < 0.12:
+        length, direction = int(rng.integers(3, 10)), rng.uniform(0, np.pi)
+        kernel = np.zeros((length, length), np.float32)
+        end = (length - 1) / 2 * np.array([np.cos(direction), np.sin(direction)])
+        middle = np.full(2, (length - 1) / 2)
+        cv2.line(kernel, np.rint(middle - end).astype(int).tolist(), np.rint(middle + end).astype(int).tolist(), 1.0)
+        image = cv2.filter2D(image, -1, kernel / kernel.sum())
+    elif kind < 0.2:
+        image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.5, 1.8))
+    elif kind < 0.28:
+        small = cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        image = cv2.resize(small, image.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+    if rng.random() < 0.15:
+        noise = rng.normal(0, rng.uniform(2, 14), image.shape[:2] + (1,) if rng.random() < 0.5 else image.shape)
+        image = np.clip(image + noise, 0, 255).astype(np.uint8)
+    if rng.random() < 0.1:
+        image = cv2.imdecode(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(25, 80))])[1], cv2.IMREAD_COLOR)
+    return image
+
+
+def erase(rng, image):
+    """A plain patch hides part of the scene, as furniture does (Zhong et al., 2020)."""
+    height, width = image.shape[:2]
+    w, h = rng.uniform(0.08, 0.35, 2) * (width, height)
+    x, y = rng.uniform(0, width - w), rng.uniform(0, height - h)
+    image[int(y):int(y + h), int(x):int(x + w)] = rng.integers(0, 256, 3)
+
+
+def sample(rng, draw, side, mosaic=0.35, strength=1.0):
+    """A picture of side x side px, its boxes [n, 5] (class, corners, px) and places to ignore [m, 4].
+
+    `draw(rng)` gives a picture and its relative boxes. `strength` 0 leaves the picture whole, 1 alters it fully.
+    """
+    border = [(114, 114, 114), (0, 0, 0), tuple(int(v) for v in rng.integers(0, 256, 3))][rng.choice(3, p=[0.5, 0.3, 0.2])]
+    canvas = np.empty((side, side, 3), np.uint8)
+    x, y = (rng.uniform(0.3, 0.7, 2) * side).astype(int) if rng.random() < mosaic else (side, side)
+    spans = [((x0, x1), (y0, y1)) for y0, y1 in ((0, y), (y, side)) for x0, x1 in ((0, x), (x, side)) if x1 > x0 and y1 > y0]
+    found, ignored = [], []
+    for (x0, x1), (y0, y1) in spans:
+        image, boxes = draw(rng)
+        single = len(spans) == 1
+        zoom = np.exp(rng.uniform(np.log(0.65), np.log(1.9))) if single else np.exp(rng.uniform(np.log(0.8), np.log(1.8)))
+        zoom *= (352 / side) ** 0.3
+        affine = matrix(rng, boxes, image.shape[0], x1 - x0, y1 - y0, zoom, strength * angle(rng))
+        canvas[y0:y1, x0:x1] = cv2.warpAffine(image, affine, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR, borderValue=border)
+        affine[:, 2] += (x0, y0)
+        good, bad = place(boxes, affine, image.shape[0], np.array([x0, y0, x1, y1], float))
+        found.append(good)
+        ignored.append(bad)
+    if rng.random() < 0.8:
+        canvas = colour(rng, canvas)
+    if rng.random() < 0.1:
+        erase(rng, canvas)
+    canvas = spoil(rng, canvas)
+    return np.ascontiguousarray(canvas), np.concatenate(found), np.concatenate(ignored)

@@ -1,0 +1,75 @@
+"""Checkpoint in, ONNX file out: six raw maps, batch norm folded, anchors and class names in the metadata, as the runtime reads it.
+
+    python -m train.export RUN/final.pt person.onnx           # float32
+    python -m train.export RUN/final.pt person.onnx --half    # weights rounded to float16 and stored so: half the size
+"""
+
+import argparse
+import json
+import pathlib
+
+import numpy as np
+import onnx
+import torch
+from torch import nn
+from torch.nn.utils.fusion import fuse_conv_bn_eval
+
+from .decode import SIDE
+from .model import YoloFastestV2
+
+NAMES = ["reg_22", "obj_22", "cls_22", "reg_11", "obj_11", "cls_11"]
+
+
+def load(path):
+    """The averaged network of a checkpoint, ready to evaluate, and its settings."""
+    state = torch.load(path, weights_only=False, map_location="cpu")
+    model = YoloFastestV2(len(state["config"]["classes"]))
+    model.load_state_dict(state["mean"])
+    return model.eval(), state["config"]
+
+
+def fold(module):
+    """Joins every convolution with the batch norm behind it."""
+    for child in module.children():
+        fold(child)
+    if isinstance(module, nn.Sequential):
+        layers = list(module)
+        for index in range(len(layers) - 1):
+            if isinstance(layers[index], nn.Conv2d) and isinstance(layers[index + 1], nn.BatchNorm2d):
+                module[index], module[index + 1] = fuse_conv_bn_eval(layers[index], layers[index + 1]), nn.Identity()
+    return module
+
+
+def halve(graph):
+    """Rounds the weights to float16."""
+    for tensor in graph.initializer:
+        if tensor.data_type == onnx.TensorProto.FLOAT:
+            values = onnx.numpy_helper.to_array(tensor).astype(np.float16).astype(np.float32)
+            tensor.CopyFrom(onnx.numpy_helper.from_array(values, tensor.name))
+
+
+def write(checkpoint, out, half):
+    model, config = load(checkpoint)
+    torch.onnx.export(fold(model), (torch.zeros(1, 3, SIDE, SIDE),), out, input_names=["input"], output_names=NAMES, opset_version=13,
+                      dynamo=False)
+    exported = onnx.load(out)
+    for key in ("classes", "anchors"):
+        exported.metadata_props.add(key={"classes": "names"}.get(key, key), value=json.dumps(config[key]))
+    if half:
+        halve(exported.graph)
+    onnx.checker.check_model(exported)
+    onnx.save(exported, out)
+    print(f"{out}: {out.stat().st_size} bytes, classes {config['classes']}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("checkpoint", type=pathlib.Path)
+    parser.add_argument("onnx", type=pathlib.Path)
+    parser.add_argument("--half", action="store_true", help="round the weights to float16")
+    options = parser.parse_args()
+    write(options.checkpoint, options.onnx, options.half)
+
+
+if __name__ == "__main__":
+    main()
