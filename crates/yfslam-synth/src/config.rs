@@ -39,7 +39,7 @@ impl CameraMotion {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Activity {
-    /// They walk around the desk, stop, turn and walk on.
+    /// They walk around the desk, all the same way and two abreast, stop, turn and walk on.
     Walking,
     /// They sit (or stand, once the chairs are taken) and gesture a little.
     Sitting,
@@ -87,8 +87,8 @@ pub struct WorldConfig {
     pub people: usize,
     /// What moves besides people.
     pub actors: ActorsConfig,
-    /// Mean share of the picture that all who walk or drive cover, 0 to 0.8. They linger before the camera, and walk nearer
-    /// to it, to meet it as well as they can; [`World::person_share`](crate::World::person_share) tells what was reached.
+    /// Mean share of the picture that all who walk or drive cover, 0 to 0.8. They stroll more slowly past the camera and nearer
+    /// to it, and for a large share stop before it, to meet it as well as they can; [`World::person_share`](crate::World::person_share) tells what was reached.
     pub person_share: f64,
     /// Number of frames.
     pub frames: usize,

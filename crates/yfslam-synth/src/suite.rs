@@ -72,7 +72,7 @@ pub const SUITE: &[NamedWorld] = &[
         "corridor_loop",
         "people walk along four corridors around a block; the camera is carried around it once",
         |c| {
-            walking(c, CameraMotion::Loop);
+            passing(c, CameraMotion::Loop);
             c.scene = SceneKind::Corridor;
             c.frames = 1250;
         },
@@ -81,7 +81,7 @@ pub const SUITE: &[NamedWorld] = &[
         "dark_rescue",
         "a damaged hall with little texture and failing light; a robot drives through it past people",
         |c| {
-            walking(c, CameraMotion::Drive);
+            passing(c, CameraMotion::Drive);
             c.scene = SceneKind::Rescue;
             (c.light.exposure, c.light.flicker) = (0.5, 0.6);
         },
@@ -92,7 +92,14 @@ fn sitting(config: &mut WorldConfig, motion: CameraMotion) {
     (config.activity, config.motion) = (Activity::Sitting, motion);
 }
 
+/// Two and two stroll past: enough to lead most of the picture's corners along, little enough to leave walls to hold on to.
 fn walking(config: &mut WorldConfig, motion: CameraMotion) {
+    (config.activity, config.motion) = (Activity::Walking, motion);
+    (config.people, config.person_share) = (4, 0.3);
+}
+
+/// Two people, for narrow places.
+fn passing(config: &mut WorldConfig, motion: CameraMotion) {
     (config.activity, config.motion) = (Activity::Walking, motion);
 }
 

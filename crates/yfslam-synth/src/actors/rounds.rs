@@ -1,7 +1,8 @@
-//! The rounds that people walk and robots drive, timed so that nobody meets.
+//! The rounds that people walk and robots drive, timed so that nobody runs into anybody.
 //!
 //! In: a scene, how many go round, and how close to the camera. Out: a way for each. There are two lanes, an oval in an
-//! oval around the furniture, walked in opposite directions.
+//! oval around the furniture. All go the same way, two abreast: to a camera, several people who stroll past together are
+//! harder than people who stand, or cross each other, because most of what it sees then moves alike.
 
 use super::people::tasks::HANDLING_S;
 use super::walkway::{Stop, Walkway};
@@ -10,10 +11,15 @@ use crate::rng::Rng;
 use crate::scene::Scene;
 
 const LANE_M: f64 = 0.5;
-/// Pause before the camera at closeness 1, s.
-const LINGER_S: f64 = 8.0;
-/// The same at closeness 2, for one, two or three of a lane, who must not catch up with each other.
-const LONG_LINGER_S: [f64; 3] = [14.0, 14.0, 9.5];
+/// How far the outer of two abreast is ahead of the inner one before the camera, which so sees both, m.
+const AHEAD_M: f64 = 0.9;
+/// Half the way past the camera, m; in narrow scenes a share of their width.
+const PAST_M: f64 = 1.3;
+const PAST_SHARE: f64 = 0.6;
+/// Pace past the camera at closeness 1, relative to that at closeness 0.
+const STROLL: f64 = 0.25;
+/// Pause before the camera at closeness 2, for one, two or three of a lane, who must not catch up with each other, s.
+const LINGER_S: [f64; 3] = [14.0, 14.0, 9.5];
 
 /// Index of the person who carries a box: the first one, whose inner lane has room at its side.
 pub fn carrier(config: &WorldConfig) -> Option<usize> {
@@ -33,15 +39,28 @@ fn lane_of(k: usize) -> usize {
     (k + 1) % 2
 }
 
-/// The round of number `k` of those who go round, for a closeness up to 2: lingers the longer in front of the camera, and
-/// the shorter out of its sight, the closer; from one half to 1 the near side comes nearer to the camera; beyond 1 those who
-/// stand there move together and face the camera.
+/// The round of number `k` of those who go round, for a closeness up to 2: strolls the slower past the camera, and waits the
+/// shorter out of its sight, the closer; beyond 1 they come nearer, too, stop before it and face it.
 pub fn round(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> Walkway {
-    let (late, wall, closeness) = ((-closeness).max(0.0), (closeness - 1.0).clamp(0.0, 1.0), closeness.clamp(0.0, 1.0));
+    let going = walkers(scene, config) + config.actors.robots;
+    let in_lane = (0..going).filter(|&other| lane_of(other) == lane_of(k)).count().max(1);
+    let [own, model] = [k, 1].map(|number| lane(scene, config, number, closeness));
+    // Someone comes by early, however short the sequence is; in half of the worlds sooner than in the others.
+    let seconds = config.frames as f64 / config.camera.fps;
+    let late = (-closeness).max(0.0) + Rng::new(config.seed, 0x1a7e).range64(0.3, 0.6);
+    // All share a schedule, evenly spread over the round, and so never meet.
+    let spread = (k / 2) as f64 / in_lane as f64;
+    let before = [scene.walk_center.x, scene.walk_near_y[1]];
+    own.in_step_with(&model.meeting(before, seconds.min(12.0) * late, spread))
+}
+
+/// The round of number `k` with times of its own: its shape differs a little from all others, its stops and paces do not.
+fn lane(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> Walkway {
     let lane = lane_of(k);
+    let (wall, closeness) = ((closeness - 1.0).clamp(0.0, 1.0), closeness.clamp(0.0, 1.0));
     let inward = LANE_M * lane as f64;
     let [closest, farthest] = scene.walk_near_y;
-    let near = farthest + (closest - farthest) * (2.0 * closeness - 1.0).clamp(0.0, 1.0) + inward;
+    let near = farthest + (closest - farthest) * wall + inward;
     let (far, half) = (scene.walk_far_y - inward, scene.walk_half_width - 0.9 * inward);
     let (cx, cy) = (scene.walk_center.x, (near + far) / 2.0);
     let mut own = Rng::new(config.seed, 0x3a1c + k as u64);
@@ -60,38 +79,40 @@ pub fn round(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> W
         [0.80 * half, near + 0.30],
     ]
     .map(|[x, y]| [jitter(cx + x), jitter(y)]);
-    // All of one lane share its schedule, evenly spread over the round, and so never meet.
-    let mut draw = Rng::new(config.seed, 0x5c4e + lane as u64);
-    let speed = draw.range64(0.75, 1.0);
-    let handling = if carrier(config).is_some_and(|person| lane_of(person) == lane) { HANDLING_S } else { 0.0 };
-    // Towards the camera, from the direction of the way on the near side.
-    let facing = if lane == 0 { 1.4 } else { -1.4 };
-    let mut stop = |x: f64, y: f64, linger: f64, least: f64| Stop {
-        near: [cx + x + draw.range64(-0.2, 0.2) * (1.0 - 0.7 * wall), y],
-        pause: (draw.range64(0.5, 1.0) + linger * draw.range64(0.9, 1.1)).max(least),
-        glance: draw.range64(-1.2, 1.2) * (1.0 - wall) + facing * wall,
-    };
-    // Shy people wait at the side, which the camera does not see.
-    // At first only the inner lane lingers: from there, the camera sees people with their heads.
+    let mut draw = Rng::new(config.seed, 0x5c4e);
+    let (clockwise, speed) = (draw.chance(0.5), draw.range64(0.75, 1.0));
+    let onwards = if clockwise { -1.0 } else { 1.0 };
+    let stroll = speed * STROLL.powf(closeness);
     let going = walkers(scene, config) + config.actors.robots;
-    let in_lane = (0..going).filter(|&k| lane_of(k) == lane).count();
-    let linger = LINGER_S + (LONG_LINGER_S[in_lane.clamp(1, 3) - 1] - LINGER_S) * wall;
-    let bold = linger * if lane == 1 { 2.0 * closeness } else { 2.0 * closeness - 1.0 }.clamp(0.0, 1.0);
-    let shy = 10.0 * (1.0 - closeness);
-    let apart = 0.35 - 0.10 * wall;
-    let stops = [
-        stop(-apart, near, bold, handling),
-        stop(apart, near, bold, handling),
-        stop(0.0, far, 0.0, 0.0),
-        stop(half, cy, shy, 0.0),
-    ];
-    let spread = (k / 2) as f64 / in_lane.max(1) as f64;
-    // Someone of each lane comes by early, however short the sequence is; the lanes take turns, unless they are to hide as
-    // much as they can.
-    let seconds = config.frames as f64 / config.camera.fps;
-    let turn = 0.3 + 0.4 * lane as f64 + draw.range64(-0.1, 0.1);
-    let first_visit = seconds.min(12.0) * (late + turn + (0.5 - turn) * wall);
-    Walkway::new(&waypoints, &stops, speed, lane == 0).meeting(first_visit, spread)
+    let in_lane = going.div_ceil(2).clamp(1, 3);
+    let ahead = AHEAD_M * (0.5 - lane as f64);
+    // Towards the camera, from the direction of the way on the near side.
+    let facing = 1.4 * -onwards;
+    let mut before = |x: f64, pace: f64, linger: f64, least: f64| Stop {
+        near: [cx + onwards * (x + ahead) + draw.range64(-0.1, 0.1), near],
+        pause: (draw.range64(0.1, 0.4) + linger * draw.range64(0.9, 1.1)).max(least),
+        glance: draw.range64(-0.6, 0.6) * (1.0 - wall) + facing * wall,
+        pace,
+    };
+    let past = PAST_M.min(PAST_SHARE * half);
+    let mut stops = vec![before(-past, speed, 0.0, 0.0), before(past, stroll, 0.0, 0.0)];
+    let handling = if carrier(config).is_some() { HANDLING_S } else { 0.0 };
+    let linger = LINGER_S[in_lane - 1] * wall;
+    if handling + linger > 0.0 {
+        let apart = 0.35 - 0.10 * wall;
+        stops.splice(0..0, [-apart, apart].map(|x| before(x, stroll, linger, handling)));
+    }
+    // Shy people wait at the side, which the camera does not see.
+    let mut away = |near: [f64; 2], shy: f64| Stop {
+        near,
+        pause: draw.range64(0.3, 0.8) + shy * draw.range64(0.9, 1.1),
+        glance: draw.range64(-1.2, 1.2),
+        pace: speed,
+    };
+    stops.push(away([cx, far], 0.0));
+    // Not just where the round begins: there, it could be the first of some and the last of others.
+    stops.push(away([cx + half, cy + 0.3], 10.0 * (1.0 - closeness)));
+    Walkway::new(&waypoints, &stops, clockwise)
 }
 
 /// How many people go round.

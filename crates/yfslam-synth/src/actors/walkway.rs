@@ -1,6 +1,6 @@
 //! The way someone walks: a closed smooth round with stops.
 //!
-//! In: way-points, stops, a speed and a phase. Out: position, heading, distance walked and speed at any time. The round is a
+//! In: way-points, stops with the paces to them, and a phase. Out: position, heading, distance walked and speed at any time. The round is a
 //! closed Catmull–Rom spline, walked by arc length; between stops the speed follows a minimum-jerk profile with a plateau.
 
 /// A closed round.
@@ -11,8 +11,6 @@ pub struct Walkway {
     arc: Vec<f64>,
     legs: Vec<Leg>,
     period: f64,
-    /// Time in the round at the middle of the first stop, s.
-    visit: f64,
     phase: f64,
     clockwise: bool,
 }
@@ -40,6 +38,8 @@ pub struct Stop {
     pub pause: f64,
     /// Where one turns meanwhile, relative to the direction of the way, rad.
     pub glance: f64,
+    /// Speed on the way to it, m/s.
+    pub pace: f64,
 }
 
 /// Where a walker is.
@@ -64,10 +64,12 @@ pub struct Step {
 }
 
 const SAMPLES_PER_SPAN: usize = 24;
+/// Moments of a round among which the nearest to a place is sought.
+const MOMENTS: usize = 1000;
 
 impl Walkway {
-    /// A round through `waypoints` at about `speed` m/s with at least one stop.
-    pub fn new(waypoints: &[[f64; 2]], stops: &[Stop], speed: f64, clockwise: bool) -> Self {
+    /// A round through `waypoints` with at least one stop.
+    pub fn new(waypoints: &[[f64; 2]], stops: &[Stop], clockwise: bool) -> Self {
         let n = waypoints.len() as isize;
         let at = |i: isize| waypoints[i.rem_euclid(n) as usize];
         let mut points = Vec::new();
@@ -92,27 +94,37 @@ impl Walkway {
         let mut halts: Vec<(f64, usize)> = stops.iter().enumerate().map(|(i, stop)| (along(stop), i)).collect();
         halts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut legs = Vec::new();
-        let (mut time, mut visit) = (0.0, 0.0);
+        let mut time = 0.0;
         for (k, &(start_arc, _)) in halts.iter().enumerate() {
             let (end_arc, index) = halts[(k + 1) % halts.len()];
             let stop = stops[index];
             // With one stop only, the leg is a full round.
             let length = total - (start_arc - end_arc).rem_euclid(total);
             // The smooth profile's mean speed is a share 1 - RAMP of its plateau.
-            let walk_time = length / (speed * (1.0 - RAMP));
+            let walk_time = length / (stop.pace * (1.0 - RAMP));
             let (glance, pause) = (stop.glance, stop.pause);
             legs.push(Leg { start_time: time, walk_time, start_arc, length, glance, pause, stop: index });
-            if index == 0 {
-                visit = time + walk_time + stop.pause / 2.0;
-            }
             time += walk_time + stop.pause;
         }
-        Self { points, arc, legs, period: time, visit, phase: 0.0, clockwise }
+        Self { points, arc, legs, period: time, phase: 0.0, clockwise }
     }
 
-    /// The same round, timed to be at the first stop at `time` seconds, and then ahead by `spread` rounds.
-    pub fn meeting(self, time: f64, spread: f64) -> Self {
-        Self { phase: self.visit - time + spread * self.period, ..self }
+    /// The same round with the times of `other`, which has as many stops: the two stop and go together.
+    pub fn in_step_with(mut self, other: &Self) -> Self {
+        for (leg, model) in self.legs.iter_mut().zip(&other.legs) {
+            (leg.start_time, leg.walk_time, leg.pause) = (model.start_time, model.walk_time, model.pause);
+        }
+        (self.period, self.phase) = (other.period, other.phase);
+        self
+    }
+
+    /// The same round, timed to be nearest to `place` at `time` seconds, and then ahead by `spread` rounds.
+    pub fn meeting(self, place: [f64; 2], time: f64, spread: f64) -> Self {
+        let start = Self { phase: 0.0, ..self };
+        let moments = (0..MOMENTS).map(|k| k as f64 * start.period / MOMENTS as f64);
+        let away = |t: &f64| distance(start.at(*t).position, place);
+        let visit = moments.min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0.0);
+        Self { phase: visit - time + spread * start.period, ..start }
     }
 
     /// Where the walker is at `time` seconds.
@@ -220,8 +232,8 @@ mod tests {
     #[test]
     fn a_walker_moves_without_jumps_at_the_stated_speed_and_stops() {
         let round = [[2.0, 0.0], [0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]];
-        let stop = |near| Stop { near, pause: 1.5, glance: 0.8 };
-        let walkway = Walkway::new(&round, &[stop([0.0, 2.0]), stop([-2.0, 0.1])], 0.9, true).meeting(3.0, 0.0);
+        let stop = |near| Stop { near, pause: 1.5, glance: 0.8, pace: 0.9 };
+        let walkway = Walkway::new(&round, &[stop([0.0, 2.0]), stop([-2.0, 0.1])], true).meeting([0.0, 2.0], 3.0, 0.0);
         let met = walkway.at(3.0);
         assert!(distance(met.position, [0.0, 2.0]) < 0.1 && met.speed < 1e-9, "{met:?}");
         let h = 0.01;

@@ -24,6 +24,7 @@ pub fn build(seed: u64) -> Scene {
     let mut b = Builder::new(seed);
     let lamps = room(&mut b);
     desks(&mut b);
+    partition(&mut b);
     surroundings(&mut b);
     let blue = [0.22, 0.30, 0.46];
     let (left_heading, right_heading) = (-1.9, 1.7);
@@ -35,7 +36,7 @@ pub fn build(seed: u64) -> Scene {
         mesh: b.mesh,
         palette: b.palette,
         lights: Lights { lamps, ambient: [[0.66, 0.66, 0.69], [0.48, 0.45, 0.41]] },
-        camera: look_at(Point3::new(0.0, -1.75, 1.38), Point3::new(0.0, 1.2, 0.98)),
+        camera: look_at(Point3::new(0.0, -1.90, 1.40), Point3::new(0.0, 1.2, 1.15)),
         walk_center: Point3::new(0.0, 0.9, 0.0),
         walk_half_width: 2.3,
         walk_far_y: 2.3,
@@ -124,6 +125,17 @@ fn desks(b: &mut Builder) {
     b.density = 600.0;
     b.cuboid(on(-1.32, 1.22), Vec3::new(0.22, 0.18, 0.20), 0.3, |_| Material::Cardboard);
     b.cuboid(on(0.05, 1.30), Vec3::new(0.30, 0.12, 0.34), 0.05, |_| Material::Poster);
+}
+
+/// A plain partition behind the desks, which hides who walks behind it, and what is pinned to it.
+fn partition(b: &mut Builder) {
+    b.density = 300.0;
+    let grey = [0.60, 0.63, 0.66];
+    b.cuboid(Vec3::new(0.0, 1.47, 0.0), Vec3::new(3.1, 0.05, 1.75), 0.0, |_| Material::Cloth(grey));
+    b.density = 700.0;
+    for (x, z, w, h) in [(-1.30, 1.68, 0.30, 0.42), (0.02, 1.66, 0.42, 0.30), (1.14, 1.70, 0.21, 0.30)] {
+        b.rectangle(Vec3::new(x, 1.44, z), Vec3::x() * w, -Vec3::z() * h, Material::Poster);
+    }
 }
 
 /// What stands and hangs along the walls.

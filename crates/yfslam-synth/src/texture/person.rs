@@ -76,7 +76,7 @@ pub(super) fn shirt(canvas: &mut Canvas, [base, accent]: [Color; 2], pattern: Pa
                 () if pocket => tint(base, 0.5),
                 () if lapel => tint(base, 1.25),
                 () if seam => tint(base, 0.72),
-                () => base,
+                () => blend(base, checks(x, y, 0.038), 0.4),
             }
         }),
         Pattern::Buttons => canvas.shade(|x, y, _| {

@@ -146,7 +146,8 @@ impl Tailor<'_> {
         let shirt_material = Material::Shirt(shirt, accent, pattern);
         // Sleeves have no print, zip or buttons.
         let sleeve = match pattern {
-            Pattern::Print | Pattern::Jacket => Material::Garment(shirt),
+            Pattern::Print => Material::Garment(shirt),
+            Pattern::Jacket => Material::Shirt(shirt, blend(shirt, accent, 0.4), Pattern::Checks),
             Pattern::Buttons => Material::Garment(blend(shirt, accent, 0.5)),
             _ => shirt_material,
         };
