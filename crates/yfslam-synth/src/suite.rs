@@ -52,7 +52,7 @@ pub const SUITE: &[NamedWorld] = &[
         "pushed_chair",
         "someone pushes a chair around the desk while another one walks; the camera moves along its axes",
         |c| {
-            walking(c, CameraMotion::Xyz);
+            passing(c, CameraMotion::Xyz);
             c.actors.pushed_chair = true;
         },
     ),
@@ -98,7 +98,7 @@ fn walking(config: &mut WorldConfig, motion: CameraMotion) {
     (config.people, config.person_share) = (4, 0.3);
 }
 
-/// Two people, for narrow places.
+/// Two people, for narrow places and where something else is hard.
 fn passing(config: &mut WorldConfig, motion: CameraMotion) {
     (config.activity, config.motion) = (Activity::Walking, motion);
 }
