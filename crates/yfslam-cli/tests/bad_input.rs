@@ -178,7 +178,7 @@ fn a_camera_that_is_not_there_is_an_error_with_the_presets() {
     fails(folder.path(), &[&RUN[..], &["--camera", "tum9"]].concat(), &["tum9", "tum1, tum2, tum3, bonn"]);
     fs::remove_file(folder.path().join("seq/camera.toml")).unwrap();
     fails(folder.path(), &RUN, &["seq", "no camera file", "--camera"]);
-    fails(folder.path(), &["run", SMALL_WORLD, "--camera", "tum1"], &["brings its own camera"]);
+    fails(folder.path(), &["run", SMALL_WORLD, "--camera", "tum9"], &["tum9", "tum1, tum2, tum3, bonn"]);
 }
 
 #[test]

@@ -73,7 +73,9 @@ fn the_demo_compares_all_methods_and_says_where_the_boxes_come_from() {
         let report = report(&out);
         assert_eq!(report["config"]["dynamic"]["method"], method);
         assert_eq!(report["frames"]["tracked"], 12);
-        assert!(common::ate_rmse(&report) < 0.01, "{method}: {}", common::ate_rmse(&report));
+        // Without a filter the people lead the camera astray.
+        let limit = if method == "none" { f64::INFINITY } else { 0.01 };
+        assert!(common::ate_rmse(&report) < limit, "{method}: {}", common::ate_rmse(&report));
     }
 }
 

@@ -95,6 +95,8 @@ pub struct Slam {
     detector_failures: usize,
     last_timestamp_ns: Option<i64>,
     resets: usize,
+    /// Time of the last frame that was tracked, ns.
+    last_tracked_ns: Option<i64>,
     /// Frames that were worth keeping when mapping was busy.
     passed_over: usize,
     /// How a map from an earlier session is used; `None` if the map is all of this one.
@@ -136,6 +138,7 @@ impl Slam {
             detector_failures: 0,
             last_timestamp_ns: None,
             resets: 0,
+            last_tracked_ns: None,
             passed_over: 0,
             map_use: None,
             first_keyframe: 0,
@@ -244,9 +247,12 @@ impl Slam {
         self.state = match (tracked, self.state) {
             (true, _) => TrackingState::Tracking,
             (false, TrackingState::NotInitialized) => TrackingState::NotInitialized,
-            (false, _) if self.is_map_worthless() => self.reset(),
+            (false, _) if self.is_map_worthless(frame.timestamp_ns) => self.reset(),
             (false, _) => TrackingState::Lost,
         };
+        if tracked {
+            self.last_tracked_ns = Some(frame.timestamp_ns);
+        }
         self.note_anchor(frame.timestamp_ns);
         Ok(Tracked {
             timestamp_ns: frame.timestamp_ns,
@@ -352,9 +358,12 @@ impl Slam {
         free
     }
 
-    /// Whether a fresh start is worth more than the map (ORB-SLAM2): it is young, and all of this session.
-    fn is_map_worthless(&self) -> bool {
-        self.map_use.is_none() && self.owner.map().keyframe_count() <= self.config.tracking.reset_max_keyframes
+    /// Whether a fresh start is worth more than the map (ORB-SLAM2): it is young, all of this session, and nothing in it was recognised
+    /// for a while.
+    fn is_map_worthless(&self, now_ns: i64) -> bool {
+        let c = &self.config.tracking;
+        let lost_s = self.last_tracked_ns.map_or(f64::INFINITY, |then| now_ns.saturating_sub(then) as f64 * 1e-9);
+        self.map_use.is_none() && self.owner.map().keyframe_count() <= c.reset_max_keyframes && lost_s > c.reset_after_s
     }
 
     /// Throws the map away and starts over with the next frame. The poses that hung on it go with it.
@@ -365,6 +374,7 @@ impl Slam {
         );
         self.owner.reset();
         self.anchors.clear();
+        self.last_tracked_ns = None;
         self.tracker.reset();
         self.resets += 1;
         TrackingState::NotInitialized
