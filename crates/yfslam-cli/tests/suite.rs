@@ -62,7 +62,7 @@ fn poor(cells: &[Value]) -> Vec<&Value> {
 #[test]
 fn worlds_are_tracked_within_5_cm_in_nine_frames_of_ten() {
     let folder = tempfile::tempdir().unwrap();
-    let names: Vec<&str> = yfslam_synth::names().into_iter().filter(|name| *name != "corridor_loop").collect();
+    let names = yfslam_synth::names();
     let cells = cells(folder.path(), &names, "b");
     assert_eq!(cells.len(), names.len());
     assert!(poor(&cells).is_empty(), "{:#?}", poor(&cells));
@@ -75,14 +75,6 @@ fn without_a_filter_walkers_lead_the_camera_astray_by_20_cm_or_ten_times_as_far_
         assert!(none > 0.2 || none >= 10.0 * yf, "{name}: none {none} m, yf {yf} m");
         assert!(yf < 0.03, "{name}: yf {yf} m");
     }
-}
-
-#[test]
-#[ignore = "fails: with seed 1 the map is lost in the first frames and begun anew"]
-fn the_corridor_is_tracked_within_5_cm_in_nine_frames_of_ten() {
-    let folder = tempfile::tempdir().unwrap();
-    let cells = cells(folder.path(), &["corridor_loop"], "b");
-    assert!(poor(&cells).is_empty(), "{:#?}", poor(&cells));
 }
 
 #[test]
