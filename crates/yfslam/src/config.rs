@@ -3,10 +3,13 @@
 //! Each section is declared once by `config_section!`: the doc comment, the type and the default of a key stand together, and
 //! [`Config::to_commented_toml`] prints the same words as comments.
 
+mod validate;
+
 use serde::{Deserialize, Serialize};
 
 use crate::dynamic::Method;
 use crate::dynamic::depth_group::Grouping;
+pub use validate::ConfigError;
 
 /// Field names and doc comments of a configuration section.
 pub type FieldDocs = &'static [(&'static str, &'static str)];
@@ -376,97 +379,6 @@ impl Config {
             text.push('\n');
         }
         Ok(text)
-    }
-}
-
-/// A value of the configuration with which nothing can work.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{key} = {value} in the configuration cannot work: it must be {must}")]
-pub struct ConfigError {
-    /// Section and key.
-    pub key: &'static str,
-    /// The value found.
-    pub value: String,
-    /// What would do.
-    pub must: &'static str,
-}
-
-impl Config {
-    /// Checks the values that would otherwise make a run fail without a word.
-    ///
-    /// # Errors
-    /// For the first such value.
-    pub fn validate(&self) -> Result<(), ConfigError> {
-        let positive = |x: f64| x.is_finite() && x > 0.0;
-        let share = |x: f64| (0.0..=1.0).contains(&x);
-        let (f, d, t) = (&self.features, &self.depth, &self.tracking);
-        let checks: [(&'static str, String, bool, &'static str); 16] = [
-            ("features.count", f.count.to_string(), f.count > 0, "at least 1"),
-            ("features.levels", f.levels.to_string(), (1..=16).contains(&f.levels), "from 1 to 16"),
-            (
-                "features.scale_factor",
-                f.scale_factor.to_string(),
-                f.scale_factor > 1.0 && f.scale_factor <= 2.0,
-                "above 1, at most 2",
-            ),
-            ("features.cell_px", f.cell_px.to_string(), f.cell_px > 0, "at least 1 px"),
-            (
-                "depth.corner_sigma_px",
-                d.corner_sigma_px.to_string(),
-                positive(d.corner_sigma_px),
-                "a positive length in px",
-            ),
-            ("depth.noise_per_m", d.noise_per_m.to_string(), positive(d.noise_per_m), "positive, in 1/m"),
-            (
-                "depth.close_limit_baselines",
-                d.close_limit_baselines.to_string(),
-                positive(d.close_limit_baselines),
-                "a positive number of baselines",
-            ),
-            ("depth.max_m", d.max_m.to_string(), positive(d.max_m), "a positive length in m"),
-            (
-                "dynamic.open_score",
-                self.dynamic.open_score.to_string(),
-                share(self.dynamic.open_score.into()),
-                "from 0 to 1",
-            ),
-            (
-                "dynamic.keep_score",
-                self.dynamic.keep_score.to_string(),
-                share(self.dynamic.keep_score.into()),
-                "from 0 to 1",
-            ),
-            (
-                "dynamic.group_half_width_m",
-                self.dynamic.group_half_width_m.to_string(),
-                positive(self.dynamic.group_half_width_m.into()),
-                "a positive length in m",
-            ),
-            (
-                "dynamic.max_extra_features",
-                self.dynamic.max_extra_features.to_string(),
-                self.dynamic.max_extra_features.is_finite() && self.dynamic.max_extra_features >= 1.0,
-                "at least 1",
-            ),
-            (
-                "tracking.motion_radius_px",
-                t.motion_radius_px.to_string(),
-                positive(t.motion_radius_px.into()),
-                "a positive length in px",
-            ),
-            (
-                "tracking.local_radius_px",
-                t.local_radius_px.to_string(),
-                positive(t.local_radius_px.into()),
-                "a positive length in px",
-            ),
-            ("tracking.max_gap_s", t.max_gap_s.to_string(), positive(t.max_gap_s), "a positive time in s"),
-            ("pose.rounds", self.pose.rounds.to_string(), self.pose.rounds > 0, "at least 1"),
-        ];
-        match checks.into_iter().find(|(.., holds, _)| !holds) {
-            Some((key, value, _, must)) => Err(ConfigError { key, value, must }),
-            None => Ok(()),
-        }
     }
 }
 
