@@ -250,8 +250,14 @@ impl BackendThread {
         match self.answers.try_recv() {
             Ok(answer) => Some(self.adopt(answer)),
             Err(TryRecvError::Empty) => None,
-            // `busy` stays set: no more keyframes are handed over.
-            Err(TryRecvError::Disconnected) => None,
+            Err(TryRecvError::Disconnected) => {
+                if self.requests.take().is_some() {
+                    tracing::error!("the mapping thread has ended by a panic: the map no longer grows");
+                }
+                // No more keyframes are handed over; they count as passed over.
+                self.busy = true;
+                None
+            }
         }
     }
 

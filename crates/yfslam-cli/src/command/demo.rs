@@ -22,7 +22,7 @@ use crate::terminal::{Terminal, explain};
 const EXAMPLES: &str = "\
 Examples:
   yfslam demo
-  yfslam demo --frames 60 --out /tmp/demo
+  yfslam demo --frames 60 --out demo
   yfslam demo --methods none,yf --seed 7
 
 In the output folder, `report.html` shows it all; `none/`, `boxes/` and `yf/` hold what `yfslam run` leaves behind.";

@@ -8,7 +8,7 @@ pub mod displaced;
 pub mod people;
 mod rounds;
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
+#[allow(clippy::unwrap_used, reason = "a test may")]
 mod tests;
 mod thing;
 pub mod walkway;
