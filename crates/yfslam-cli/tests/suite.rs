@@ -78,6 +78,14 @@ fn without_a_filter_walkers_lead_the_camera_astray_by_20_cm_or_ten_times_as_far_
 }
 
 #[test]
+fn where_people_sit_the_filter_makes_a_difference_of_2_mm_at_most_or_a_tenth() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, none, yf) in errors(folder.path(), "sitting") {
+        assert!((none - yf).abs() <= (0.1 * none).max(0.002), "{name}: none {none} m, yf {yf} m");
+    }
+}
+
+#[test]
 fn a_world_gives_the_same_figures_on_every_run() {
     let folder = tempfile::tempdir().unwrap();
     let figures = |out: &str| -> Vec<[Value; 4]> {

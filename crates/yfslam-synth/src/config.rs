@@ -204,8 +204,8 @@ pub struct SensorConfig {
     pub disparity_step_px: f32,
     /// Whether places that the projector cannot see, and depth edges, have no depth.
     pub holes: bool,
-    /// Angle between the surface's normal and the ray beyond which there is no depth, degrees; 90 measures at any angle. The noise
-    /// model of Nguyen et al. covers angles up to 80°, beyond which they got no readings to fit.
+    /// Angle between the surface's normal and the ray beyond which there is no depth, degrees; 90 measures at any angle. The
+    /// default is a choice of ours: little of the projected light comes back from steeper surfaces.
     pub max_angle_deg: f32,
     /// Least light that comes back, as reflectance · cos θ / z², 1/m²; darker places have no depth; 0 measures them all. The default
     /// loses black cloth and screens (reflectance 0.04) beyond 2.8 m and keeps grey walls over the whole range.

@@ -173,8 +173,9 @@ config_section! {
 config_section! {
     /// Growth and refinement of the map (ORB-SLAM2 section III; ORB-SLAM section VI).
     MappingConfig {
-        /// Landmarks made from depth beyond the close limit, if fewer close ones exist. Source: ORB-SLAM2.
-        min_depth_landmarks: usize = 100,
+        /// Landmarks made from depth, nearest first, before the close limit ends it. ORB-SLAM2 has 100; where people hide what is near,
+        /// that leaves too few, and weights by distance already say how little a far depth tells.
+        min_depth_landmarks: usize = 1000,
         /// Found/visible below which a young landmark is dropped. Source: ORB-SLAM2.
         min_found_ratio: f64 = 0.25,
         /// Keyframes during which a landmark is young. Source: ORB-SLAM2.

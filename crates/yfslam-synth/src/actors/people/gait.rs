@@ -113,7 +113,7 @@ fn gestures(j: &mut Joints, seed: u64, time: f32, lively: f32) {
     let s = |channel, hertz| sway(seed, channel, time, hertz);
     j.head[0] += 0.06 + 0.08 * lively * s(1, 0.21);
     j.head[1] += 0.45 * lively * s(2, 0.11);
-    j.trunk[0] += 0.025 * s(3, 0.13) + 0.006 * s(4, 0.27);
+    j.trunk[0] += 0.02 * lively * s(3, 0.13) + 0.004 * s(4, 0.27);
     j.trunk[1] += 0.10 * lively * s(5, 0.07);
     for side in [0, 1] {
         let channel = 10 * (side as u64 + 1);
@@ -162,6 +162,6 @@ pub fn sit(p: &Proportions, height: f32, seed: u64, time: f32) -> Joints {
         trunk: [0.02, 0.0, 0.0],
         ..Joints::default()
     };
-    gestures(&mut j, seed, time, 1.0);
+    gestures(&mut j, seed, time, 0.3);
     j
 }
