@@ -1,7 +1,7 @@
 """Checkpoint in, ONNX file out: six raw maps, batch norm folded, anchors and class names in the metadata, as the runtime reads it.
 
     python -m train.export RUN/final.pt person.onnx           # float32
-    python -m train.export RUN/final.pt person.onnx --half    # weights rounded to float16 and stored so: half the size
+    python -m train.export RUN/final.pt person.onnx --half    # weights stored as float16: half the size
 """
 
 import argparse
@@ -41,11 +41,18 @@ def fold(module):
 
 
 def halve(graph):
-    """Rounds the weights to float16."""
+    """Stores the weights as float16, each followed by a cast to float32, in which the network computes."""
+    casts = []
     for tensor in graph.initializer:
-        if tensor.data_type == onnx.TensorProto.FLOAT:
-            values = onnx.numpy_helper.to_array(tensor).astype(np.float16).astype(np.float32)
-            tensor.CopyFrom(onnx.numpy_helper.from_array(values, tensor.name))
+        values = onnx.numpy_helper.to_array(tensor)
+        # Biases and the like are few, and keep their precision.
+        if values.dtype == np.float32 and values.ndim > 1:
+            name, half = tensor.name, tensor.name + "_half"
+            tensor.CopyFrom(onnx.numpy_helper.from_array(values.astype(np.float16), half))
+            casts.append(onnx.helper.make_node("Cast", [half], [name], name + "_cast", to=onnx.TensorProto.FLOAT))
+    nodes = list(graph.node)
+    del graph.node[:]
+    graph.node.extend(casts + nodes)
 
 
 def write(checkpoint, out, half):
@@ -66,7 +73,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("checkpoint", type=pathlib.Path)
     parser.add_argument("onnx", type=pathlib.Path)
-    parser.add_argument("--half", action="store_true", help="round the weights to float16")
+    parser.add_argument("--half", action="store_true", help="store the weights as float16")
     options = parser.parse_args()
     write(options.checkpoint, options.onnx, options.half)
 

@@ -33,7 +33,7 @@ pub struct Verbosity {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    Run(run::RunArgs),
+    Run(Box<run::RunArgs>),
     Eval(eval::EvalArgs),
     Demo(demo::DemoArgs),
     Synth(synth::SynthArgs),

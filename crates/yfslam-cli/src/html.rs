@@ -6,50 +6,41 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use yfslam_eval::StampedPose;
-use yfslam_eval::report::{Frames, MethodReport, Picture, Report, Stage, Times};
+use yfslam_eval::report::{Frames, MethodReport, Report, Stage, Times};
 use yfslam_io::write_atomically;
 
 use crate::accuracy::to_eval;
+use crate::boxes::BoxOrigin;
+use crate::lane::Judged;
 use crate::output::OutputFolder;
 use crate::pipeline::Stages;
-use crate::report::{BoxSource, Run};
+use crate::report::Run;
 use crate::settings::describe;
-
-/// The run of one method and its pictures.
-pub struct Shown<'a> {
-    pub run: Run<'a>,
-    pub pictures: Vec<Picture>,
-}
 
 /// Writes `report.html` into the folder and returns its path; `shared` are stages that all runs have in common. Runs must be of the
 /// same sequence; the first is what the others are compared with.
 ///
 /// # Errors
 /// The file cannot be written, or a configuration cannot be.
-pub fn write(out: &OutputFolder, runs: Vec<Shown>, shared: &Stages) -> Result<PathBuf> {
+pub fn write(out: &OutputFolder, runs: &[Run], shared: &Stages) -> Result<PathBuf> {
     let path = out.path().join("report.html");
     let html = page(runs, shared)?;
     write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
     Ok(path)
 }
 
-fn page(runs: Vec<Shown>, shared: &Stages) -> Result<String> {
-    let Some(Run { source, truth, .. }) = runs.first().map(|shown| shown.run) else {
-        return Ok(String::new());
-    };
-    let trajectories: Vec<Vec<StampedPose>> = runs.iter().map(|s| to_eval(&s.run.outcome.trajectory)).collect();
-    let facts = runs.first().map(|shown| facts(&shown.run, runs.last().map_or(shown.run.boxes, |last| last.run.boxes)));
-    let wall_s = runs.iter().map(|s| s.run.outcome.wall.as_secs_f64()).fold(0.0, f64::max);
-    let mut methods = Vec::new();
-    for (shown, trajectory) in runs.into_iter().zip(&trajectories) {
-        methods.push(method(shown, trajectory)?);
-    }
+fn page(runs: &[Run], shared: &Stages) -> Result<String> {
+    let Some(first @ Run { source, truth, .. }) = runs.first() else { return Ok(String::new()) };
+    let trajectories: Vec<Vec<StampedPose>> = runs.iter().map(|r| to_eval(&r.judged.outcome.trajectory)).collect();
+    let boxes = runs.iter().map(|run| run.judged.boxes).find(|boxes| !matches!(boxes, BoxOrigin::None));
+    let wall_s = runs.iter().map(|r| r.judged.outcome.wall.as_secs_f64()).fold(0.0, f64::max);
+    let methods = runs.iter().zip(&trajectories).map(|(run, trajectory)| method(run.judged, trajectory));
     let report = Report {
         sequence: &source.name,
-        facts: facts.unwrap_or_default(),
+        facts: facts(first, boxes.unwrap_or(&BoxOrigin::None)),
         frames_ns: &source.stamps_ns,
         truth: truth.map(|truth| truth.poses.as_slice()),
-        methods,
+        methods: methods.collect::<Result<_>>()?,
         shared_stages: stages(shared),
         wall_s,
         version: env!("CARGO_PKG_VERSION"),
@@ -58,15 +49,15 @@ fn page(runs: Vec<Shown>, shared: &Stages) -> Result<String> {
     Ok(report.html())
 }
 
-fn method<'a>(shown: Shown<'a>, trajectory: &'a [StampedPose]) -> Result<MethodReport<'a>> {
-    let Run { outcome, evaluation, config, .. } = shown.run;
+fn method<'a>(judged: &'a Judged, trajectory: &'a [StampedPose]) -> Result<MethodReport<'a>> {
+    let Judged { outcome, config, pictures, .. } = judged;
     let (name, summary) = describe(config.dynamic.method);
     let tally = &outcome.frames;
     Ok(MethodReport {
         name,
         summary,
         trajectory,
-        evaluation,
+        evaluation: judged.evaluation(),
         frames: Frames {
             total: tally.total(),
             tracked: tally.tracked,
@@ -78,7 +69,7 @@ fn method<'a>(shown: Shown<'a>, trajectory: &'a [StampedPose]) -> Result<MethodR
             tracking_s: outcome.stages.total("frame").as_secs_f64(),
             cpu_s: outcome.cpu.map(|cpu| cpu.as_secs_f64()),
         },
-        pictures: shown.pictures,
+        pictures: pictures.clone(),
         config: config.to_commented_toml()?,
     })
 }
@@ -94,20 +85,11 @@ fn stages(stages: &Stages) -> Vec<Stage> {
 }
 
 /// What there is to know about the sequence, as name and value.
-fn facts(run: &Run, boxes: BoxSource) -> Vec<(&'static str, String)> {
+fn facts(run: &Run, boxes: &BoxOrigin) -> Vec<(&'static str, String)> {
     let (camera, stamps) = (&run.source.camera, &run.source.stamps_ns);
     let seconds = match (stamps.first(), stamps.last()) {
         (Some(first), Some(last)) => last.saturating_sub(*first) as f64 / 1e9,
         _ => 0.0,
-    };
-    let boxes = match boxes {
-        BoxSource::None => "none needed".to_owned(),
-        BoxSource::Renderer => "exact, from the renderer".to_owned(),
-        BoxSource::Folder => "exact, from the recording's boxes.json".to_owned(),
-        BoxSource::Detector(model) => {
-            let file = model.file.file_name().unwrap_or(model.file.as_os_str()).to_string_lossy();
-            format!("{file} (CRC-32 {})", model.crc32)
-        }
     };
     let (width, height) = (camera.camera.width, camera.camera.height);
     let faults = match run.faults {
@@ -119,7 +101,7 @@ fn facts(run: &Run, boxes: BoxSource) -> Vec<(&'static str, String)> {
         ("Faults injected", faults),
         ("Frames", format!("{} in {seconds:.1} s", stamps.len())),
         ("Camera", format!("{width} × {height} px, {}", camera.origin)),
-        ("Boxes", boxes),
+        ("Boxes", boxes.to_string()),
         ("Ground truth", run.truth.map_or("none".to_owned(), |truth| truth.origin.clone())),
     ]
 }
@@ -131,7 +113,7 @@ fn command() -> String {
 }
 
 /// A word as a shell takes it.
-fn quote(word: &str) -> String {
+pub fn quote(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         word.to_owned()

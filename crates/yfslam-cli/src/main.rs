@@ -1,17 +1,19 @@
 //! The command `yfslam`.
 //!
 //! ```text
-//! arguments ─cli─► command/* ─► source (folder, synthetic world) ─► pipeline (Slam, what became of each frame) ─► output (files)
+//! arguments ─cli─► command/* ─► source (folder, world) ─► boxes ─► lane, one a method (pipeline: Slam, tallies) ─► output (files)
 //! ```
 
 mod accuracy;
 mod bench;
+mod boxes;
 mod cli;
 mod command;
 mod cpu;
 mod detector;
 mod draw;
 mod html;
+mod lane;
 mod map;
 mod moments;
 mod output;
@@ -21,6 +23,7 @@ mod progress;
 mod report;
 mod settings;
 mod source;
+mod summary;
 mod terminal;
 
 use std::process::ExitCode;

@@ -29,6 +29,16 @@ pub struct MapArgs {
 }
 
 impl MapArgs {
+    /// The options that ask for something a run of several methods cannot do: each method makes its own map, on its own thread.
+    pub fn of_one_method(&self) -> Vec<&'static str> {
+        let options = [
+            ("--load-map", self.load_map.is_some()),
+            ("--save-map", self.save_map.is_some()),
+            ("--threaded", self.threaded),
+        ];
+        options.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect()
+    }
+
     /// A system that maps as was asked for.
     ///
     /// # Errors

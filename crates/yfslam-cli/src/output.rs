@@ -12,6 +12,8 @@ use crate::report::Report;
 
 /// Folder for the folders of runs whose `--out` is left out.
 const DEFAULT_PARENT: &str = "yfslam-out";
+/// Why one method of several has no result.
+pub const FAILURE_FILE: &str = "failure.txt";
 
 /// A folder that can be written to.
 #[derive(Clone, Debug)]
@@ -32,8 +34,27 @@ impl OutputFolder {
         Ok(Self(folder))
     }
 
+    /// A folder in it for one method of several, without word of an earlier failure.
+    ///
+    /// # Errors
+    /// As [`OutputFolder::prepare`].
+    pub fn of_method(&self, name: &str) -> Result<Self> {
+        let folder = Self::prepare(Some(&self.0.join(name)), name)?;
+        // None is there, or it is overwritten if there is a new one.
+        let _ = std::fs::remove_file(folder.0.join(FAILURE_FILE));
+        Ok(folder)
+    }
+
     pub fn path(&self) -> &Path {
         &self.0
+    }
+
+    /// Writes why the method has no result.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_failure(&self, why: &str) -> Result<()> {
+        Ok(write_atomically(&self.0.join(FAILURE_FILE), |file| writeln!(file, "{why}"))?)
     }
 
     /// Writes everything but the report.

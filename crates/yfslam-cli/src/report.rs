@@ -6,8 +6,9 @@ use yfslam_eval::Evaluation;
 use yfslam_io::Fault;
 use yfslam_io::sequence::AssociationReport;
 
-use crate::detector::ModelIdentity;
-use crate::pipeline::{DynamicTally, FrameTally, Outcome, PlaceTally, Stages};
+use crate::boxes::BoxOrigin;
+use crate::lane::Judged;
+use crate::pipeline::{DynamicTally, FrameTally, PlaceTally, Stages};
 use crate::source::{Source, Truth};
 
 /// What a report is made of.
@@ -16,12 +17,9 @@ pub struct Run<'a> {
     /// As the user named it.
     pub sequence: &'a str,
     pub source: &'a Source,
-    pub boxes: BoxSource<'a>,
     pub faults: &'a [Fault],
-    pub outcome: &'a Outcome,
     pub truth: Option<&'a Truth>,
-    pub evaluation: Option<&'a Evaluation>,
-    pub config: &'a Config,
+    pub judged: &'a Judged<'a>,
 }
 
 /// Everything that `run.json` says.
@@ -33,7 +31,7 @@ pub struct Report<'a> {
     pub camera_origin: &'a str,
     pub camera: &'a Camera,
     /// Where the boxes of movable objects come from.
-    pub boxes: BoxSource<'a>,
+    pub boxes: &'a BoxOrigin,
     /// Faults put into the frames on purpose.
     pub faults: Vec<String>,
     pub frames: &'a FrameTally,
@@ -43,11 +41,13 @@ pub struct Report<'a> {
     /// Loops that were closed, and stretches over which the camera was lost.
     pub places: &'a PlaceTally,
     pub map: MapSize,
-    /// Wall time of each stage over all frames; `mapping` over keyframes. `detector` runs beside `features`, decoding beside all.
-    pub times: &'a Stages,
+    /// Wall time of each stage over all frames; `mapping` over keyframes. Decoding runs beside all; `detector` runs beside `features`
+    /// or, if the frames are taken through several methods, once for all of them.
+    pub times: Stages,
     pub wall_s: f64,
     pub fps: f64,
-    /// Processor time of tracking and detection, without reading or rendering; `null` where the system does not tell.
+    /// Processor time of tracking and detection, without reading or rendering; `null` where the system does not tell. Detection counts
+    /// in full for each method that it was done for.
     pub cpu_s: Option<f64>,
     /// Peak resident memory, MB (10⁶ bytes); `null` where the system does not tell.
     pub peak_memory_mb: Option<f64>,
@@ -56,20 +56,6 @@ pub struct Report<'a> {
     pub evaluation: Option<&'a Evaluation>,
     /// The resolved configuration.
     pub config: &'a Config,
-}
-
-/// Where the boxes of movable objects come from.
-#[derive(Clone, Copy, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BoxSource<'a> {
-    /// The method needs none.
-    None,
-    /// The synthetic world knows them.
-    Renderer,
-    /// The `boxes.json` of the folder.
-    Folder,
-    /// A network.
-    Detector(&'a ModelIdentity),
 }
 
 #[derive(Serialize)]
@@ -94,7 +80,8 @@ pub struct Association {
 impl<'a> Report<'a> {
     /// The report of one run.
     pub fn new(run: &Run<'a>) -> Self {
-        let Run { sequence, source, boxes, faults, outcome, truth, evaluation, config } = *run;
+        let Run { sequence, source, faults, truth, judged } = *run;
+        let Judged { config, outcome, boxes, shared, .. } = judged;
         Self {
             yfslam: env!("CARGO_PKG_VERSION"),
             sequence,
@@ -107,13 +94,13 @@ impl<'a> Report<'a> {
             dynamic: &outcome.dynamic,
             places: &outcome.places,
             map: MapSize { keyframes: outcome.keyframes.len(), landmarks: outcome.landmarks.len() },
-            times: &outcome.stages,
+            times: shared.and(&outcome.stages),
             wall_s: outcome.wall.as_secs_f64(),
             fps: outcome.fps(),
             cpu_s: outcome.cpu.map(|cpu| cpu.as_secs_f64()),
             peak_memory_mb: peak_memory_mb(),
             groundtruth: truth.map(|truth| truth.origin.as_str()),
-            evaluation,
+            evaluation: judged.evaluation(),
             config,
         }
     }

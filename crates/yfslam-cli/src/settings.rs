@@ -12,9 +12,6 @@ use yfslam::dynamic::depth_group::Grouping;
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "System")]
 pub struct SettingsArgs {
-    /// How moving things are kept out [default: yf].
-    #[arg(long, value_enum, value_name = "METHOD", hide_default_value = true)]
-    pub method: Option<MethodArg>,
     /// How the depth group of a moving body is found [default: exact].
     #[arg(long, value_enum, value_name = "GROUPING")]
     pub grouping: Option<GroupingArg>,
@@ -82,7 +79,6 @@ impl SettingsArgs {
             None => Config::default(),
         };
         let dynamic = &mut config.dynamic;
-        dynamic.method = self.method.map_or(dynamic.method, MethodArg::method);
         match self.grouping {
             Some(GroupingArg::Exact) => dynamic.grouping = Grouping::Exact,
             Some(GroupingArg::Ransac) => dynamic.grouping = Grouping::Ransac,

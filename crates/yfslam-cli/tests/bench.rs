@@ -4,47 +4,73 @@
 mod common;
 
 use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use common::{fails, record, succeeds};
+
+/// A world without people: quick to render, and every method tracks it.
+const EMPTY: &str = "walking_xyz?people=0&width=320&height=240";
+
+/// The cells, sorted, and when they were written.
+fn cells(root: &Path) -> Vec<(PathBuf, SystemTime)> {
+    let mut cells: Vec<_> = fs::read_dir(root.join("b/cells")).unwrap().map(|e| e.unwrap().path()).collect();
+    cells.sort();
+    cells.into_iter().map(|path| (path.clone(), fs::metadata(path).unwrap().modified().unwrap())).collect()
+}
 
 #[test]
 fn a_bench_goes_on_where_it_stopped_and_tells_worlds_and_folders_alike() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     record(&root.join("seq"));
-    let world = "walking_xyz?people=0&width=320&height=240";
-    let args = ["bench", world, "seq", "--methods", "none", "--seeds", "2", "--frames", "8", "--out", "b"];
+    fs::write(root.join("seq/boxes.json"), r#"{"classes":["person"],"frames":[]}"#).unwrap();
+    let args = ["bench", EMPTY, "seq", "--methods", "none,yf", "--seeds", "2", "--frames", "8", "--out", "b"];
     let first = succeeds(root, &args);
     for row in ["walking_xyz?people=0", "seq ", "100.0 (100.0)"] {
         assert!(first.stdout.contains(row), "no '{row}' in {}", first.stdout);
     }
-    assert_eq!(fs::read_to_string(root.join("b/cells.csv")).unwrap().lines().count(), 5);
-    let cells = || {
-        let mut cells: Vec<_> = fs::read_dir(root.join("b/cells")).unwrap().map(|e| e.unwrap().path()).collect();
-        cells.sort();
-        cells.into_iter().map(|path| (fs::metadata(&path).unwrap().modified().unwrap(), path)).collect::<Vec<_>>()
-    };
-    let before = cells();
-    assert_eq!(before.len(), 4);
-    // One cell is missing, one is cut in half: both are run again, the others are not.
-    fs::remove_file(&before[0].1).unwrap();
-    fs::write(&before[1].1, "{\"seq").unwrap();
+    assert_eq!(fs::read_to_string(root.join("b/cells.csv")).unwrap().lines().count(), 9);
+    let before = cells(root);
+    assert_eq!(before.len(), 8);
+    // One method is missing, both methods of another are, one of them cut in half: they are run again, the others are not.
+    fs::remove_file(&before[0].0).unwrap();
+    fs::remove_file(&before[2].0).unwrap();
+    fs::write(&before[3].0, "{\"seq").unwrap();
     let second = succeeds(root, &args);
     assert_eq!(second.stdout, first.stdout);
-    assert_eq!(cells()[2..], before[2..]);
+    let after = cells(root);
+    assert!(after[1] == before[1] && after[4..] == before[4..]);
+    assert!(after[0].1 > before[0].1 && after[2].1 > before[2].1 && after[3].1 > before[3].1);
+    // A further method runs alone.
+    succeeds(root, &[&args[..4], &["none,boxes,yf"], &args[5..]].concat());
+    let more = cells(root);
+    assert_eq!(more.len(), 12);
+    assert!(after.iter().all(|cell| more.contains(cell)));
     // Other options, other figures.
     succeeds(root, &[&args[..], &["--", "--start", "2"]].concat());
-    assert_ne!(cells()[2..], before[2..]);
+    assert!(cells(root).iter().filter(|cell| more.contains(cell)).count() == 4);
 }
 
 #[test]
-fn a_run_that_fails_is_a_cell_that_says_so() {
+fn a_method_that_fails_is_a_cell_that_says_so_and_the_others_have_their_figures() {
     let folder = tempfile::tempdir().unwrap();
-    let args = ["bench", "walking_xyz?people=0&width=320&height=240", "--methods", "none", "--seeds", "1"];
-    let faulty = ["--frames", "8", "--out", "b", "--", "--fault", "black@0+9"];
-    let output = succeeds(folder.path(), &[&args[..], &faulty].concat());
+    let root = folder.path();
+    let args = ["bench", EMPTY, "--methods", "none,yf", "--seeds", "1", "--frames", "8", "--out", "b"];
+    let output = succeeds(root, &[&args[..], &["--", "--fault", "black@0+9"]].concat());
     assert!(output.stderr.contains("no map could be begun"), "{}", output.stderr);
-    let csv = fs::read_to_string(folder.path().join("b/cells.csv")).unwrap();
-    assert!(csv.contains("no map could be begun"), "{csv}");
-    fails(folder.path(), &["bench", "nowhere"], &["nowhere is no folder", "walking_xyz"]);
+    let csv = fs::read_to_string(root.join("b/cells.csv")).unwrap();
+    assert_eq!(csv.matches("no map could be begun").count(), 2, "{csv}");
+    // A file where the pictures of one method should go.
+    let run = fs::read_dir(root.join("b/runs")).unwrap().next().unwrap().unwrap().path();
+    fs::write(run.join("none/overlay"), "").unwrap();
+    succeeds(root, &[&args[..], &["--", "--overlay"]].concat());
+    let csv = fs::read_to_string(root.join("b/cells.csv")).unwrap();
+    let line = |method: &str| csv.lines().find(|line| line.contains(&format!(",{method},1,"))).unwrap();
+    assert!(line("none").contains(",none,1,,,,,,\"") && line("none").contains("overlay"), "{csv}");
+    assert!(line("yf").contains(",yf,1,0.") && line("yf").ends_with(','), "{csv}");
+    // A run that does not begin.
+    let output = succeeds(root, &[&args[..], &["--", "--depth-factor", "5"]].concat());
+    assert!(output.stderr.contains("leave out --depth-factor"), "{}", output.stderr);
+    fails(root, &["bench", "nowhere"], &["nowhere is no folder", "walking_xyz"]);
 }

@@ -65,7 +65,8 @@ fn info_tells_what_was_found_even_where_a_run_would_fail() {
 fn the_demo_compares_all_methods_and_says_where_the_boxes_come_from() {
     let folder = tempfile::tempdir().unwrap();
     let output = succeeds(folder.path(), &["demo", "--frames", "12", "--out", "demo"]);
-    assert!(output.stdout.contains("boxes from the renderer"), "{}", output.stdout);
+    assert!(output.stdout.contains("boxes: exact, from the renderer"), "{}", output.stdout);
+    assert!(output.stderr.contains("--method none,boxes,yf --report --out demo"), "{}", output.stderr);
     assert!(output.stdout.contains("improve RMSE (%)"), "{}", output.stdout);
     for method in ["none", "boxes", "yf"] {
         let out = folder.path().join("demo").join(method);

@@ -55,6 +55,18 @@ fn every_spelling_of_the_graph_gives_the_same_network() {
 }
 
 #[test]
+fn weights_stored_in_16_bits_give_the_same_bits_as_the_same_weights_in_32() {
+    let size = Size { height: 64, width: 96, channels: 8, classes: 3 };
+    let [whole, halves] = [false, true].map(|store| {
+        let mut net = Net::yolo(&size, Style::Folded, 6);
+        net.halve(store);
+        (net.to_onnx().len(), run(&net, 3, &image(&size, 7), Level::new()))
+    });
+    assert!(whole.1 == halves.1 && halves.1.iter().any(|value| *value != 0.0));
+    assert!(halves.0 < whole.0, "{} bytes, {} in 32 bits", halves.0, whole.0);
+}
+
+#[test]
 fn sizes_and_channels_that_fill_no_vector_are_computed_right() {
     for (height, width, channels, classes) in [(32, 32, 1, 1), (32, 160, 5, 2), (224, 32, 7, 13), (96, 160, 24, 4)] {
         check(&Size { height, width, channels, classes }, Style::Folded, 3);

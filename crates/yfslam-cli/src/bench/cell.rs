@@ -1,4 +1,4 @@
-//! One run of the table: what it is, and what came of it.
+//! One cell of the table, and the group of cells that one run fills.
 
 use std::path::Path;
 
@@ -7,36 +7,41 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use yfslam_io::write_atomically;
 
-/// What is run.
+use crate::output::FAILURE_FILE;
+
+/// The cells of one sequence and one seed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Plan {
+pub struct Group {
     /// Name in the table.
     pub sequence: String,
     /// As `yfslam run` takes it.
     pub source: String,
-    /// `none`, `boxes` or `yf`.
-    pub method: String,
+    /// `none`, `boxes` or `yf`, each once.
+    pub methods: Vec<String>,
     /// Of the world, or of the method's random draws.
     pub seed: u64,
     /// Words that set frames and seed.
     pub options: Vec<String>,
+    /// Words that name a detector, for methods that need one.
+    pub detector: Vec<String>,
 }
 
-impl Plan {
-    /// Name of the cell's files.
+impl Group {
+    /// Name of the group's folder.
     pub fn key(&self) -> String {
         let name: String = self.sequence.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-        format!("{name}-{}-{}", self.method, self.seed)
+        format!("{name}-{}", self.seed)
     }
 
-    /// Words for this program, but for the output folder.
-    pub fn arguments(&self, extra: &[String]) -> Vec<String> {
-        let words = ["run", &self.source, "--method", &self.method];
-        words.iter().map(|word| (*word).to_owned()).chain(self.options.iter().chain(extra).cloned()).collect()
+    /// Words for this program to run some of the methods, but for the output folder.
+    pub fn arguments(&self, methods: &[&str], extra: &[String]) -> Vec<String> {
+        let words = ["run", &self.source, "--method", &methods.join(",")].map(str::to_owned);
+        let detector = if methods.iter().any(|method| *method != "none") { &self.detector[..] } else { &[] };
+        words.into_iter().chain([&self.options, detector, extra].concat()).collect()
     }
 }
 
-/// What came of a run.
+/// What came of one method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Name in the table.
@@ -53,39 +58,47 @@ pub struct Cell {
     pub rpe_frame_m: Option<f64>,
     /// Relative pose error over a second, RMSE, m.
     pub rpe_second_m: Option<f64>,
-    /// Frames a second, everything together.
-    pub fps: Option<f64>,
+    /// Processor time of tracking and detection for a frame, ms.
+    pub cpu_ms_per_frame: Option<f64>,
     /// Why there are no figures.
     pub failure: Option<String>,
-    /// What was run.
+    /// Words with which this program runs the cell alone, to the same figures.
     pub arguments: Vec<String>,
     /// CRC-32 of the program that ran.
     pub program_crc32: String,
 }
 
 impl Cell {
-    /// The figures of a run from its `run.json`.
+    /// The figures of a method from what its run left in `folder`; `failure` if it left nothing.
     pub fn of_run(
-        plan: &Plan,
-        run_json: &Path,
-        failure: Option<String>,
+        group: &Group,
+        method: &str,
+        folder: &Path,
+        failure: Option<&str>,
         arguments: Vec<String>,
         program_crc32: String,
     ) -> Self {
-        let text = std::fs::read_to_string(run_json).unwrap_or_default();
+        let text = std::fs::read_to_string(folder.join("run.json")).unwrap_or_default();
         let run: Value = serde_json::from_str(&text).unwrap_or_default();
         let figure = |place: &str| run.pointer(place).and_then(Value::as_f64);
         let ate_rmse_m = figure("/evaluation/ate/translation_m/rmse");
+        let frames = figure("/frames/read").filter(|frames| *frames > 0.0);
+        let own_failure = || Some(std::fs::read_to_string(folder.join(FAILURE_FILE)).ok()?.trim().to_owned());
+        let failure = match run {
+            Value::Null => own_failure().or_else(|| failure.map(str::to_owned)),
+            _ if ate_rmse_m.is_none() => Some("no ground truth to judge it by".into()),
+            _ => None,
+        };
         Self {
-            sequence: plan.sequence.clone(),
-            method: plan.method.clone(),
-            seed: plan.seed,
+            sequence: group.sequence.clone(),
+            method: method.to_owned(),
+            seed: group.seed,
             ate_rmse_m,
             tracked: figure("/evaluation/coverage/fraction"),
             rpe_frame_m: figure("/evaluation/rpe/0/translation_m/rmse"),
             rpe_second_m: figure("/evaluation/rpe/1/translation_m/rmse"),
-            fps: figure("/fps"),
-            failure: failure.or_else(|| ate_rmse_m.is_none().then(|| "no ground truth to judge it by".into())),
+            cpu_ms_per_frame: figure("/cpu_s").zip(frames).map(|(cpu_s, frames)| 1e3 * cpu_s / frames),
+            failure,
             arguments,
             program_crc32,
         }

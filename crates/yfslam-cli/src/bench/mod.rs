@@ -1,4 +1,5 @@
-//! Many runs for one table: each cell is a run of one sequence with one method and one seed, in a process of its own.
+//! Many runs for one table: a cell is one method on one sequence with one seed. One process runs the methods of a sequence and a seed
+//! together, on frames that are read or rendered once.
 //!
 //! In: what to run. Out: one JSON a cell, which is not run again, then [`table`]s of all of them.
 
@@ -12,7 +13,8 @@ use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result};
 
-pub use cell::{Cell, Plan};
+use crate::output::FAILURE_FILE;
+pub use cell::{Cell, Group};
 pub use table::{csv, markdown};
 
 /// Runs cells and remembers them.
@@ -23,61 +25,91 @@ pub struct Bench {
     pub program: PathBuf,
     /// CRC-32 of the program: another one runs all cells anew.
     pub program_crc32: String,
-    /// Cells at a time.
+    /// Processes at a time.
     pub jobs: usize,
     /// Words for every `yfslam run`.
     pub extra: Vec<String>,
 }
 
 impl Bench {
-    /// The cells of `plans`, in their order; those that are not done yet are run. `done` is told the number of cells that are.
+    /// The cells of `groups`, in their order; those that are not done yet are run. `done` is told the number of cells that are.
     ///
     /// # Errors
-    /// A run cannot be started or its cell cannot be written. A run that fails is a cell that says so.
-    pub fn cells(&self, plans: &[Plan], done: impl Fn(usize) + Sync) -> Result<Vec<Cell>> {
+    /// A run cannot be started or a cell cannot be written. A method that fails is a cell that says so.
+    pub fn cells(&self, groups: &[Group], done: impl Fn(usize) + Sync) -> Result<Vec<Cell>> {
         let (next, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let cells = Mutex::new(Vec::new());
         let work = || {
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(plan) = plans.get(index) else { return };
-                let cell = self.cell(plan);
+                let Some(group) = groups.get(index) else { return };
+                let found = self.group(group);
                 if let Ok(mut cells) = cells.lock() {
-                    cells.push((index, cell));
+                    cells.push((index, found));
                 }
-                done(finished.fetch_add(1, Ordering::Relaxed) + 1);
+                done(finished.fetch_add(group.methods.len(), Ordering::Relaxed) + group.methods.len());
             }
         };
         std::thread::scope(|scope| (0..self.jobs.max(1)).for_each(|_| drop(scope.spawn(work))));
-        let mut cells = cells.into_inner().unwrap_or_else(PoisonError::into_inner);
-        cells.sort_by_key(|&(index, _)| index);
-        cells.into_iter().map(|(_, cell)| cell).collect()
+        let mut groups = cells.into_inner().unwrap_or_else(PoisonError::into_inner);
+        groups.sort_by_key(|&(index, _)| index);
+        Ok(groups.into_iter().map(|(_, cells)| cells).collect::<Result<Vec<_>>>()?.concat())
     }
 
-    /// The cell that is there already, or that of a new run.
-    fn cell(&self, plan: &Plan) -> Result<Cell> {
-        let path = self.folder.join("cells").join(plan.key() + ".json");
-        let arguments = plan.arguments(&self.extra);
-        if let Some(known) = Cell::read(&path)
-            && known.program_crc32 == self.program_crc32
-            && known.arguments == arguments
-        {
-            return Ok(known);
+    /// The cells that are there already, and those of a new run of the methods that are missing.
+    fn group(&self, group: &Group) -> Result<Vec<Cell>> {
+        let known: Vec<Option<Cell>> = group.methods.iter().map(|method| self.known(group, method)).collect();
+        let missing: Vec<&str> =
+            group.methods.iter().zip(&known).filter(|(_, known)| known.is_none()).map(|(m, _)| m.as_str()).collect();
+        let failure = if missing.is_empty() { None } else { self.run(group, &missing)? };
+        let cell = |(method, known): (&String, Option<Cell>)| match known {
+            Some(cell) => Ok(cell),
+            None => {
+                let arguments = group.arguments(&[method], &self.extra);
+                let (folder, crc32) = (self.folder_of(group).join(method), self.program_crc32.clone());
+                let cell = Cell::of_run(group, method, &folder, failure.as_deref(), arguments, crc32);
+                cell.write(&self.path_of(group, method))?;
+                Ok(cell)
+            }
+        };
+        group.methods.iter().zip(known).map(cell).collect()
+    }
+
+    /// The cell that is there already, of the same program and options.
+    fn known(&self, group: &Group, method: &str) -> Option<Cell> {
+        let known = Cell::read(&self.path_of(group, method))?;
+        let same =
+            known.program_crc32 == self.program_crc32 && known.arguments == group.arguments(&[method], &self.extra);
+        same.then_some(known)
+    }
+
+    /// Runs some methods of a group, each into a folder of its own. Returns what the program said if it failed as a whole.
+    fn run(&self, group: &Group, methods: &[&str]) -> Result<Option<String>> {
+        let folder = self.folder_of(group);
+        for method in methods {
+            // What an earlier program left must not pass for the result of this one.
+            for name in ["run.json", FAILURE_FILE] {
+                let _ = std::fs::remove_file(folder.join(method).join(name));
+            }
         }
-        let run = self.folder.join("runs").join(plan.key());
-        // What an earlier program left must not pass for the result of this one.
-        let _ = std::fs::remove_file(run.join("run.json"));
+        // One method alone has no folder of its own in the output folder.
+        let out = if let [method] = methods { folder.join(method) } else { folder };
         let output = Command::new(&self.program)
-            .args(&arguments)
+            .args(group.arguments(methods, &self.extra))
             .arg("--quiet")
             .arg("--out")
-            .arg(&run)
+            .arg(&out)
             .output()
             .with_context(|| format!("cannot start {}", self.program.display()))?;
-        let error = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-        let failure = (!output.status.success()).then_some(error);
-        let cell = Cell::of_run(plan, &run.join("run.json"), failure, arguments, self.program_crc32.clone());
-        cell.write(&path)?;
-        Ok(cell)
+        let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        Ok((!output.status.success()).then_some(said))
+    }
+
+    fn folder_of(&self, group: &Group) -> PathBuf {
+        self.folder.join("runs").join(group.key())
+    }
+
+    fn path_of(&self, group: &Group, method: &str) -> PathBuf {
+        self.folder.join("cells").join(format!("{}-{method}.json", group.key()))
     }
 }

@@ -48,9 +48,10 @@ pub fn markdown(cells: &[Cell]) -> String {
 
 /// One line for each cell; a figure that is not known is empty.
 pub fn csv(cells: &[Cell]) -> String {
-    let mut text = "sequence,method,seed,ate_rmse_m,tracked,rpe_frame_m,rpe_second_m,fps,failure\n".to_owned();
+    let mut text =
+        "sequence,method,seed,ate_rmse_m,tracked,rpe_frame_m,rpe_second_m,cpu_ms_per_frame,failure\n".to_owned();
     for cell in cells {
-        let figures = [cell.ate_rmse_m, cell.tracked, cell.rpe_frame_m, cell.rpe_second_m, cell.fps];
+        let figures = [cell.ate_rmse_m, cell.tracked, cell.rpe_frame_m, cell.rpe_second_m, cell.cpu_ms_per_frame];
         let figures = figures.map(|figure| figure.map_or(String::new(), |value| value.to_string())).join(",");
         let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
         let failure = cell.failure.as_deref().map_or(String::new(), quoted);
@@ -73,7 +74,7 @@ mod tests {
             tracked: ate.map(|_| 0.5),
             rpe_frame_m: ate,
             rpe_second_m: None,
-            fps: Some(20.0),
+            cpu_ms_per_frame: Some(20.0),
             failure: ate.is_none().then(|| "no trajectory".into()),
             arguments: vec![],
             program_crc32: String::new(),

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use clap::{Args, value_parser};
 use yfslam_io::write_atomically;
 
-use crate::bench::{Bench, Plan, csv, markdown};
+use crate::bench::{Bench, Group, csv, markdown};
 use crate::output::OutputFolder;
 use crate::progress::Progress;
 use crate::terminal::Terminal;
@@ -22,8 +22,10 @@ Examples:
 In the output folder:
   table.md   median, least and greatest error over the seeds
   cells.csv  every run
-  cells/     every run as JSON; those that are there are not run again, unless program or options have changed
-  runs/      what each run left behind";
+  cells/     every cell as JSON; those that are there are not run again, unless program or options have changed
+  runs/      what each run left behind
+
+One process takes a sequence with one seed through all methods at once, a thread for each.";
 
 /// Run sequences with several methods and seeds, and tabulate the errors. Can be stopped, and goes on where it stopped.
 #[derive(Args, Debug)]
@@ -33,7 +35,7 @@ pub struct BenchArgs {
     #[arg(value_name = "SEQUENCE")]
     sequences: Vec<String>,
     /// Methods to compare.
-    #[arg(long, value_name = "METHOD,METHOD", value_delimiter = ',', default_value = "none,boxes,yf",
+    #[arg(long, alias = "method", value_name = "METHOD,METHOD", value_delimiter = ',', default_value = "none,boxes,yf",
           value_parser = ["none", "boxes", "yf"])]
     methods: Vec<String>,
     /// Number of seeds: of the world if it is synthetic, else of the method's random draws.
@@ -45,7 +47,7 @@ pub struct BenchArgs {
     /// Network that finds people, for methods `boxes` and `yf` [default: synthetic worlds and boxes.json tell].
     #[arg(long, value_name = "FILE.onnx")]
     detector: Option<PathBuf>,
-    /// Runs at a time.
+    /// Processes at a time; each uses about as many cores as there are methods.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=256))]
     jobs: u16,
     /// Where results go [default: yfslam-out/bench].
@@ -57,7 +59,7 @@ pub struct BenchArgs {
 }
 
 pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
-    let plans = args.plans()?;
+    let groups = args.groups()?;
     let out = OutputFolder::prepare(args.out.as_deref(), "bench")?;
     let program = std::env::current_exe().context("cannot find this program's own file")?;
     let image = std::fs::read(&program).with_context(|| format!("cannot read {}", program.display()))?;
@@ -68,10 +70,10 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
         jobs: args.jobs.into(),
         extra: args.extra.clone(),
     };
-    let progress = Mutex::new(Progress::new(terminal, "bench", plans.len()));
-    let cells = bench.cells(&plans, |done| {
+    let progress = Mutex::new(Progress::new(terminal, "bench", groups.iter().map(|group| group.methods.len()).sum()));
+    let cells = bench.cells(&groups, |done| {
         if let Ok(mut progress) = progress.lock() {
-            progress.at(done, "runs", String::new);
+            progress.at(done, "cells", String::new);
         }
     })?;
     if let Ok(progress) = progress.into_inner() {
@@ -90,50 +92,47 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
 
 impl BenchArgs {
     /// All cells, sequence by sequence.
-    fn plans(&self) -> Result<Vec<Plan>> {
+    fn groups(&self) -> Result<Vec<Group>> {
         let suite = || yfslam_synth::names().into_iter().map(str::to_owned).collect();
         let sequences = if self.sequences.is_empty() { suite() } else { self.sequences.clone() };
-        let mut plans = Vec::new();
+        let mut groups = Vec::new();
         for sequence in &sequences {
             let folder = Path::new(sequence).is_dir();
             if !folder {
                 // Better known before the first run than in the middle of the night.
                 yfslam_synth::parse(sequence).with_context(|| format!("{sequence} is no folder either"))?;
             }
-            for method in &self.methods {
-                for seed in 1..=self.seeds {
-                    plans.push(if folder {
-                        self.recorded(sequence, method, seed)
-                    } else {
-                        self.world(sequence, method, seed)
-                    });
-                }
-            }
+            let group = |seed| if folder { self.recorded(sequence, seed) } else { self.world(sequence, seed) };
+            groups.extend((1..=self.seeds).map(group));
         }
-        Ok(plans)
+        Ok(groups)
     }
 
-    fn recorded(&self, folder: &str, method: &str, seed: u64) -> Plan {
+    fn recorded(&self, folder: &str, seed: u64) -> Group {
         let path = Path::new(folder);
         let name = path.file_name().map_or(folder.into(), |name| name.to_string_lossy());
         let mut options = vec!["--seed".to_owned(), seed.to_string()];
         options.extend(self.frames.into_iter().flat_map(|frames| ["--end".to_owned(), frames.to_string()]));
-        self.plan(&name, folder.to_owned(), method, seed, options)
+        self.group(&name, folder.to_owned(), seed, options)
     }
 
-    fn world(&self, spec: &str, method: &str, seed: u64) -> Plan {
+    fn world(&self, spec: &str, seed: u64) -> Group {
         let spec = spec.strip_prefix("synth:").unwrap_or(spec);
         let mut source = format!("synth:{spec}{}seed={seed}", if spec.contains('?') { '&' } else { '?' });
         if let Some(frames) = self.frames {
             source += &format!("&frames={frames}");
         }
-        self.plan(spec, source, method, seed, Vec::new())
+        self.group(spec, source, seed, Vec::new())
     }
 
-    fn plan(&self, name: &str, source: String, method: &str, seed: u64, mut options: Vec<String>) -> Plan {
-        if let Some(file) = self.detector.as_ref().filter(|_| method != "none") {
-            options.extend(["--detector".to_owned(), file.display().to_string()]);
+    fn group(&self, name: &str, source: String, seed: u64, options: Vec<String>) -> Group {
+        let mut methods: Vec<String> = Vec::new();
+        for method in &self.methods {
+            if !methods.contains(method) {
+                methods.push(method.clone());
+            }
         }
-        Plan { sequence: name.to_owned(), source, method: method.to_owned(), seed, options }
+        let detector = self.detector.iter().flat_map(|file| ["--detector".to_owned(), file.display().to_string()]);
+        Group { sequence: name.to_owned(), source, methods, seed, options, detector: detector.collect() }
     }
 }

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 
-use crate::settings::SettingsArgs;
+use crate::settings::{MethodArg, SettingsArgs};
 use crate::terminal::print;
 
 const EXAMPLES: &str = "\
@@ -18,10 +18,15 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct ConfigArgs {
+    /// How moving things are kept out [default: yf].
+    #[arg(long, value_enum, value_name = "METHOD", help_heading = "System")]
+    method: Option<MethodArg>,
     #[command(flatten)]
-    pub settings: SettingsArgs,
+    settings: SettingsArgs,
 }
 
 pub fn run(args: &ConfigArgs) -> Result<()> {
-    print(&args.settings.resolve()?.to_commented_toml()?)
+    let mut config = args.settings.resolve()?;
+    config.dynamic.method = args.method.map_or(config.dynamic.method, MethodArg::method);
+    print(&config.to_commented_toml()?)
 }

@@ -1,26 +1,27 @@
-//! `yfslam run`: a sequence in, its trajectory out.
+//! `yfslam run`: a sequence in, its trajectory out; with several methods, one of each.
 
-use std::fmt::Write;
+use std::ffi::OsString;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
-use clap::Args;
+use anyhow::{Context, Result, bail, ensure};
+use clap::{Args, Command, FromArgMatches};
+use yfslam::Config;
 use yfslam::dynamic::Method;
-use yfslam::{Config, Slam};
-use yfslam_eval::{EvalOptions, Evaluation, ExpectedFrames, TableStyle};
+use yfslam_eval::TableStyle;
 
-use crate::accuracy::{MatchArgs, judge, to_eval};
-use crate::detector::{self, DetectorArgs, LoadedDetector};
+use crate::accuracy::MatchArgs;
+use crate::boxes::{self, DetectionTally, SharedDetector};
+use crate::detector::{DetectorArgs, LoadedDetector};
 use crate::html;
+use crate::lane::{Extras, Judge, Judged, Lane};
 use crate::map::MapArgs;
-use crate::moments::Moments;
 use crate::output::OutputFolder;
-use crate::overlay::Overlay;
-use crate::pipeline::{Outcome, Pipeline, PlaceTally, Stages};
+use crate::pipeline::Stages;
 use crate::progress::Progress;
-use crate::report::{BoxSource, Report, Run};
-use crate::settings::SettingsArgs;
+use crate::report::{Report, Run};
+use crate::settings::{MethodArg, SettingsArgs, describe};
 use crate::source::{Source, SourceArgs, Truth};
+use crate::summary;
 use crate::terminal::{Terminal, explain};
 
 const EXAMPLES: &str = "\
@@ -28,6 +29,7 @@ Examples:
   yfslam run rgbd_bonn_crowd --camera bonn --detector yolo-fastestv2.onnx
   yfslam run rgbd_dataset_freiburg1_xyz --camera tum1 --method none
   yfslam run 'synth:walking_xyz?seed=7&frames=300' --out walk      no data needed
+  yfslam run synth:walking_rpy --method none,boxes,yf --report     side by side
   yfslam run DIR --start 100 --end 400 --reverse --overlay --report
   yfslam run DIR --save-map lab.map                    then, another day:
   yfslam run OTHER --load-map lab.map --localise
@@ -43,10 +45,16 @@ In the output folder:
   overlay/        with --overlay, one picture a frame
   report.html     with --report, all of it on one page: figures, pictures, tables
 
-Ends with success only if a trajectory was produced.";
+Of several methods each has a folder of its own in the output folder, OUT/none and so on, and report.html compares them. Each frame is
+read or rendered once, and the network looks at it once; results are those of a run of each method alone. A method that fails leaves a
+failure.txt and does not stop the others.
+
+Ends with success only if a trajectory was produced, by one method at least.";
 
 /// Evenly spread moments of which the report has a picture.
 const MOMENTS: usize = 5;
+/// The same for each of several methods.
+const MOMENTS_OF_EACH: usize = 3;
 
 /// Track a sequence: its trajectory, map and report go to a folder.
 #[derive(Args, Debug)]
@@ -54,6 +62,16 @@ const MOMENTS: usize = 5;
 pub struct RunArgs {
     #[command(flatten)]
     source: SourceArgs,
+    /// How moving things are kept out [default: yf]. Several methods are run side by side; the others are compared with the first.
+    #[arg(
+        long = "method",
+        alias = "methods",
+        value_enum,
+        value_name = "METHOD,METHOD",
+        value_delimiter = ',',
+        help_heading = "System"
+    )]
+    methods: Vec<MethodArg>,
     #[command(flatten)]
     settings: SettingsArgs,
     #[command(flatten)]
@@ -79,84 +97,95 @@ pub struct RunArgs {
 
 pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let config = args.settings.resolve()?;
+    let methods = args.methods(&config)?;
     let max_diff_ns = args.matching.max_diff_ns()?;
-    let detector = load_detector(args, &config)?;
-    let identity = detector.as_ref().map(|d| d.identity.clone());
-    let boxes = match &identity {
-        Some(identity) => BoxSource::Detector(identity),
-        None if config.dynamic.method == Method::None => BoxSource::None,
-        None if args.source.is_synthetic() => {
-            terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
-            BoxSource::Renderer
-        }
-        None => {
-            terminal.note("no --detector: the boxes of people come from the folder's boxes.json");
-            BoxSource::Folder
-        }
-    };
-    let own_boxes = matches!(boxes, BoxSource::Renderer | BoxSource::Folder);
-    let mut source = args.source.open(own_boxes.then_some(&*config.dynamic.movable))?;
+    let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
+    let mut source = args.source.open(boxes.is_source().then_some(&*config.dynamic.movable))?;
     let truth = find_truth(args, &source, terminal)?;
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
-    let pictures = args.overlay.then(|| Overlay::prepare(out.path(), config.dynamic.open_score)).transpose()?;
-    let mut moments = args.report.then(|| Moments::new(source.stamps_ns.len(), MOMENTS, config.dynamic.open_score));
     args.map.check()?;
-    let (detector, detector_times) = detector.map(|d| (d.detector, d.times)).unzip();
-    let slam = args.map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
-    let mut pipeline = Pipeline::new(slam, detector_times);
-    drive(&mut source, &mut pipeline, pictures.as_ref(), moments.as_mut(), terminal)?;
-    args.map.save(&mut pipeline)?;
-    let outcome = pipeline.finish(&config)?;
+    let (mut lanes, mut shared) = lanes(args, &config, &methods, &source, &out, detector)?;
+    let reading = drive(&mut source, shared.as_mut(), &mut lanes, terminal);
 
-    let evaluation = truth.as_ref().map(|truth| {
-        let expected = ExpectedFrames::StampsNs(source.stamps_ns.clone());
-        let options = EvalOptions { max_diff_ns, expected, ..Default::default() };
-        judge(&truth.poses, &to_eval(&outcome.trajectory), options)
-    });
-    out.write(&outcome, &config)?;
-    let run = Run {
-        sequence: &args.source.sequence,
-        source: &source,
-        boxes,
-        faults: &args.source.faults,
-        outcome: &outcome,
-        truth: truth.as_ref(),
-        evaluation: evaluation.as_ref().and_then(|e| e.as_ref().ok()),
-        config: &config,
-    };
-    let report = Report::new(&run);
-    out.write_report(&report)?;
-    terminal.result(&summary(&report, &source, &outcome)?)?;
-    let page = match moments {
-        Some(moments) => {
-            let shown = html::Shown { run, pictures: moments.to_pictures()? };
-            Some(html::write(&out, vec![shown], &Stages::default())?)
+    let detection = shared.map_or_else(DetectionTally::default, SharedDetector::into_tally);
+    let (reading, truth) = (&reading, truth.as_ref());
+    let judge_by = Judge { source: &source, truth, max_diff_ns, boxes: &boxes, reading, detection: &detection };
+    let judged = finish(args, lanes, judge_by, terminal)?;
+    let run =
+        |judged| Run { sequence: &args.source.sequence, source: &source, faults: &args.source.faults, truth, judged };
+    let runs: Vec<Run> = judged.iter().map(run).collect();
+    for run in &runs {
+        let report = Report::new(run);
+        run.judged.folder.write_report(&report)?;
+        if methods.len() == 1 {
+            terminal.result(&summary::of_one(&report, run)?)?;
         }
-        None => None,
-    };
-    let judged = show_accuracy(args, evaluation.as_ref(), terminal);
+    }
+    let page = args.report.then(|| html::write(&out, &runs, &reading.and(&detection.stages))).transpose()?;
+    if methods.len() > 1 {
+        terminal.result(&summary::of_several(&judged, &source, truth))?;
+    } else if let Some(evaluation) = judged.first().and_then(Judged::evaluation) {
+        terminal.result(&format!("\n{}", evaluation.table(TableStyle::Plain)))?;
+    }
     terminal.result(&format!("\nwritten to {}\n", out.path().display()))?;
     if let Some(page) = page {
         terminal.result(&format!("report: {}\n", page.display()))?;
     }
-    judged
+    check_accuracy(args, &judged, terminal)
 }
 
-/// The detector, if the method needs one and the user named one.
-fn load_detector(args: &RunArgs, config: &Config) -> Result<Option<LoadedDetector>> {
-    let method = match config.dynamic.method {
-        Method::None => return Ok(None),
-        Method::Boxes => "boxes",
-        Method::Yf => "yf",
-    };
-    match &args.detector.detector {
-        Some(file) => Ok(Some(detector::load(&args.detector, file, config)?)),
-        None if args.source.knows_boxes() => Ok(None),
-        None => bail!(
-            "method {method} keeps people out and needs a network that finds them; give --detector FILE.onnx (YOLO-FastestV2 as \
-             ONNX with six raw outputs: the official COCO weights or your own training), or --method none to trust every feature"
-        ),
+impl RunArgs {
+    /// What the words after `yfslam` ask for, for commands that are a run.
+    ///
+    /// # Errors
+    /// `yfslam run` would refuse them.
+    pub fn of_words(words: &[OsString]) -> Result<Self> {
+        let command = Self::augment_args(Command::new("yfslam run").no_binary_name(true));
+        Ok(Self::from_arg_matches(&command.try_get_matches_from(words)?)?)
     }
+
+    /// The methods that were asked for, each once; else that of the configuration.
+    fn methods(&self, config: &Config) -> Result<Vec<Method>> {
+        let mut methods: Vec<Method> = Vec::new();
+        for method in self.methods.iter().map(|m| m.method()) {
+            if !methods.contains(&method) {
+                methods.push(method);
+            }
+        }
+        if methods.is_empty() {
+            methods.push(config.dynamic.method);
+        }
+        let options = self.map.of_one_method();
+        ensure!(
+            methods.len() == 1 || options.is_empty(),
+            "{} cannot be used with several methods, each of which makes a map of its own; give one --method",
+            options.join(" and ")
+        );
+        Ok(methods)
+    }
+}
+
+/// One lane a method. A detector belongs to the only lane, or is shared.
+fn lanes(
+    args: &RunArgs,
+    config: &Config,
+    methods: &[Method],
+    source: &Source,
+    out: &OutputFolder,
+    detector: Option<LoadedDetector>,
+) -> Result<(Vec<Lane>, Option<SharedDetector>)> {
+    let alone = methods.len() == 1;
+    let moments = args.report.then_some(if alone { MOMENTS } else { MOMENTS_OF_EACH });
+    let extras = Extras { overlay: args.overlay, moments, map: &args.map };
+    let (mut own, shared) = if alone { (detector, None) } else { (None, detector) };
+    let lane = |method: &Method| {
+        let mut config = config.clone();
+        config.dynamic.method = *method;
+        let folder = if alone { out.clone() } else { out.of_method(describe(*method).0)? };
+        Lane::prepare(config, source, folder, own.take(), extras)
+    };
+    let lanes = methods.iter().map(lane).collect::<Result<_>>()?;
+    Ok((lanes, shared.map(|detector| SharedDetector::new(detector, config)).transpose()?))
 }
 
 /// A broken ground truth ends the run if it was asked for; one that merely lies in the folder is passed over.
@@ -170,109 +199,67 @@ fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Opt
     }
 }
 
-/// Takes all frames of the source through the pipeline.
+/// Takes all frames of the source through all lanes, a thread for each. Returns what reading took.
 fn drive(
     source: &mut Source,
-    pipeline: &mut Pipeline,
-    pictures: Option<&Overlay>,
-    mut moments: Option<&mut Moments>,
+    mut detector: Option<&mut SharedDetector>,
+    lanes: &mut [Lane],
     terminal: Terminal,
-) -> Result<()> {
+) -> Stages {
     let mut progress = Progress::new(terminal, &source.name, source.stamps_ns.len());
-    let mut state = Default::default();
-    while let Some(frame) = source.frames.next(&mut pipeline.stages) {
-        match frame {
-            Ok(frame) => {
-                state = pipeline.track(&frame);
-                let index = pipeline.frames().total() - 1;
-                if let Some(pictures) = pictures {
-                    pictures.write(index, &frame, pipeline.slam())?;
-                }
-                if let Some(moments) = &mut moments {
-                    moments.see(index, &frame, pipeline.slam());
-                }
-            }
-            Err(skip) => pipeline.skip(skip),
+    let mut reading = Stages::default();
+    while lanes.iter().any(|lane| !lane.has_failed())
+        && let Some(mut frame) = source.frames.next(&mut reading)
+    {
+        if let (Some(detector), Ok(frame)) = (&mut detector, &mut frame) {
+            detector.see(frame);
         }
-        progress.frame(pipeline.frames(), state);
+        let frame = &frame;
+        std::thread::scope(|scope| {
+            let Some((first, others)) = lanes.split_first_mut() else { return };
+            for lane in others {
+                scope.spawn(|| lane.take(frame));
+            }
+            first.take(frame);
+        });
+        if let Some(first) = lanes.first() {
+            progress.frame(first.pipeline.frames(), first.state);
+        }
     }
     progress.finish();
-    Ok(())
+    reading
 }
 
-/// What became of the frames, in a few lines.
-fn summary(report: &Report, source: &Source, outcome: &Outcome) -> Result<String> {
-    let frames = &outcome.frames;
-    let mut text = format!(
-        "{}: tracked {} of {} frames ({:.1} %), lost {}, skipped {}; {:.1} frames a second\n",
-        source.name,
-        frames.tracked,
-        frames.total(),
-        frames.tracked_percent(),
-        frames.lost,
-        frames.skipped,
-        report.fps
-    );
-    if frames.skipped > 0 {
-        let reasons: Vec<_> =
-            frames.skipped_by_reason.iter().map(|(reason, count)| format!("{count} × {reason}")).collect();
-        writeln!(
-            text,
-            "skipped: {}; the first: {}",
-            reasons.join(", "),
-            frames.first_skipped.as_deref().unwrap_or("-")
-        )?;
-    }
-    if let Some(a) = &report.association
-        && a.duplicate_stamps_skipped + a.backward_stamps_skipped + a.unstamped_skipped > 0
-    {
-        let (duplicate, backward, unstamped) =
-            (a.duplicate_stamps_skipped, a.backward_stamps_skipped, a.unstamped_skipped);
-        writeln!(
-            text,
-            "list entries skipped: {duplicate} × duplicate stamp, {backward} × stamp runs backward, {unstamped} × no stamp"
-        )?;
-    }
-    if frames.detector_failures > 0 {
-        writeln!(
-            text,
-            "the detector failed on {} frames, which count as frames without boxes",
-            frames.detector_failures
-        )?;
-    }
-    places_summary(&mut text, &outcome.places)?;
-    write!(text, "map: {} keyframes, {} landmarks", report.map.keyframes, report.map.landmarks)?;
-    if let Some(peak) = report.peak_memory_mb {
-        write!(text, "; peak memory {peak:.0} MB")?;
-    }
-    Ok(text + "\n")
-}
-
-fn places_summary(text: &mut String, places: &PlaceTally) -> Result<()> {
-    if !places.loops.is_empty() {
-        let drifts: Vec<_> = places.loops.iter().map(|l| format!("{:.2} m", l.drift_m)).collect();
-        writeln!(text, "loops closed: {}, after a drift of {}", places.loops.len(), drifts.join(", "))?;
-    }
-    if let Some(longest) = places.lost.iter().map(|stretch| stretch.frames).max() {
-        let found = places.lost.iter().filter(|stretch| stretch.found_again).count();
-        writeln!(text, "lost {} times, found again {found} times; for {longest} frames at most", places.lost.len())?;
-    }
-    Ok(())
-}
-
-/// Prints the errors; that they cannot be computed is an error if they were asked for.
-fn show_accuracy(
-    args: &RunArgs,
-    evaluation: Option<&Result<Evaluation, yfslam_eval::EvalError>>,
-    terminal: Terminal,
-) -> Result<()> {
-    match evaluation {
-        None => Ok(()),
-        Some(Ok(evaluation)) => terminal.result(&format!("\n{}", evaluation.table(TableStyle::Plain))),
-        Some(Err(error)) if args.groundtruth.is_none() => {
-            terminal.warn(&format!("no evaluation: {error}"));
-            Ok(())
+/// The results of all lanes. One of several that has none is told of.
+fn finish<'a>(args: &RunArgs, lanes: Vec<Lane>, judge_by: Judge<'a>, terminal: Terminal) -> Result<Vec<Judged<'a>>> {
+    let alone = lanes.len() == 1;
+    let mut judged = Vec::new();
+    for lane in lanes {
+        let (folder, (name, _)) = (lane.folder.clone(), describe(lane.config.dynamic.method));
+        match lane.finish(judge_by, &args.map) {
+            Ok(one) => judged.push(one),
+            Err(error) if alone => return Err(error),
+            Err(error) => {
+                terminal.warn(&format!("{name}: {}", explain(&error)));
+                folder.write_failure(&explain(&error))?;
+            }
         }
-        Some(Err(error)) => Err(error.clone()).context("the trajectory was written, but it cannot be judged"),
     }
+    if judged.is_empty() {
+        bail!("no method has a trajectory");
+    }
+    Ok(judged)
+}
+
+/// That errors cannot be computed is an error if they were asked for.
+fn check_accuracy(args: &RunArgs, judged: &[Judged], terminal: Terminal) -> Result<()> {
+    for one in judged {
+        let Some(Err(error)) = &one.evaluation else { continue };
+        if args.groundtruth.is_some() {
+            return Err(error.clone()).context("the trajectory was written, but it cannot be judged");
+        }
+        let (name, _) = describe(one.config.dynamic.method);
+        terminal.warn(&format!("{name}: no evaluation: {error}"));
+    }
+    Ok(())
 }

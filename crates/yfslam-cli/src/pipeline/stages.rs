@@ -28,6 +28,11 @@ impl Stages {
         }
     }
 
+    /// These stages, then those of `other`.
+    pub fn and(&self, other: &Self) -> Self {
+        Self(self.0.iter().chain(&other.0).cloned().collect())
+    }
+
     /// Duration of all runs of a stage together.
     pub fn total(&self, stage: &str) -> Duration {
         self.0.iter().filter(|(name, _)| *name == stage).flat_map(|(_, durations)| durations).sum()

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::view::View;
 use super::{Kind, Network, fold};
 use crate::ModelError;
-use crate::onnx::{Model, Node, Tensor, TensorData};
+use crate::onnx::{FLOAT, Model, Node, Tensor, TensorData};
 
 /// Largest side of the network input and of any plane, px.
 pub(super) const MAX_SIDE: usize = 2048;
@@ -95,6 +95,7 @@ impl<'m> Lowering<'m> {
         }
         let views = match node.op {
             "Constant" => return self.constant(node),
+            "Cast" => return self.cast(node),
             "Identity" => vec![self.view(node, 0)?.clone()],
             "Conv" => vec![self.conv(node)?],
             "BatchNormalization" => vec![self.batch_norm(node)?],
@@ -160,7 +161,7 @@ impl<'m> Lowering<'m> {
             }
             TensorData::Ints(_) => Err(format!("constant \"{name}\" must be float32, not int64")),
             TensorData::Other(data_type) => Err(format!(
-                "constant \"{name}\" must be float32, not ONNX data type {data_type}; export in full precision"
+                "constant \"{name}\" must be float32 or float16, not ONNX data type {data_type}; export in one of these"
             )),
         }
     }
@@ -179,6 +180,17 @@ impl<'m> Lowering<'m> {
                 Tensor { dims: vec![attribute.floats.len()], data: TensorData::Floats(attribute.floats.clone()) }
             }
         };
+        self.constants.extend(node.outputs.first().map(|output| (*output, tensor)));
+        Ok(())
+    }
+
+    /// A constant stored in fewer bits than it is used in: floats were widened when they were read.
+    fn cast(&mut self, node: &'m Node<'m>) -> Step<()> {
+        if node.int("to", 0) != FLOAT {
+            return Err("only constants can change their type, to float32".into());
+        }
+        self.floats(node, 0)?;
+        let tensor = self.tensor(node, 0)?.1.clone();
         self.constants.extend(node.outputs.first().map(|output| (*output, tensor)));
         Ok(())
     }

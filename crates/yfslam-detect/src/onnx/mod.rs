@@ -182,6 +182,7 @@ impl Tensor {
             _ if external => TensorData::External,
             (FLOAT, None) => TensorData::Floats(floats),
             (FLOAT, Some(raw)) => TensorData::Floats(elements(name, raw, f32::from_le_bytes)?),
+            (FLOAT16, Some(raw)) => TensorData::Floats(elements(name, raw, |bytes| half(u16::from_le_bytes(bytes)))?),
             (INT64, None) => TensorData::Ints(ints),
             (INT64, Some(raw)) => TensorData::Ints(elements(name, raw, i64::from_le_bytes)?),
             (other, _) => TensorData::Other(other),
@@ -201,9 +202,22 @@ impl Tensor {
     }
 }
 
-/// `TensorProto.DataType.FLOAT` and `INT64`.
-const FLOAT: i64 = 1;
+/// `TensorProto.DataType.FLOAT`, `INT64` and `FLOAT16`.
+pub(crate) const FLOAT: i64 = 1;
 const INT64: i64 = 7;
+const FLOAT16: i64 = 10;
+
+/// The value of a float of 16 bits (IEEE 754 binary16), which 32 bits hold exactly.
+fn half(bits: u16) -> f32 {
+    let sign = u32::from(bits & 0x8000) << 16;
+    let (exponent, fraction) = (u32::from(bits >> 10 & 0x1f), u32::from(bits & 0x3ff));
+    let magnitude = match exponent {
+        0 => return f32::from_bits(sign | (fraction as f32 * 2.0_f32.powi(-24)).to_bits()),
+        0x1f => 0xff << 23 | fraction << 13,
+        _ => (exponent + 112) << 23 | fraction << 13,
+    };
+    f32::from_bits(sign | magnitude)
+}
 
 fn elements<const N: usize, T>(name: &str, raw: &[u8], convert: fn([u8; N]) -> T) -> Read<Vec<T>> {
     let (chunks, rest) = raw.as_chunks::<N>();
@@ -249,4 +263,24 @@ fn fixed_size(dim: &[u8]) -> Read<Option<usize>> {
         }
     }
     Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::half;
+
+    #[test]
+    fn floats_of_16_bits_are_read_as_what_they_are() {
+        let cases =
+            [(0x3c00, 1.0), (0xc000, -2.0), (0x7bff, 65504.0), (0x3555, 0.333_251_95), (0x0400, 6.103_515_6e-5)];
+        for (bits, value) in cases {
+            assert_eq!(half(bits), value, "{bits:#x}");
+        }
+        // The least there is, the largest below the normal ones, both zeros.
+        assert_eq!([half(0x0001), half(0x83ff)], [2.0_f32.powi(-24), -1023.0 * 2.0_f32.powi(-24)]);
+        assert_eq!([half(0), half(0x8000)].map(f32::to_bits), [0, 1 << 31]);
+        assert!(half(0x7c00) == f32::INFINITY && half(0xfc00) == f32::NEG_INFINITY && half(0x7e00).is_nan());
+        // Positive ones ascend with their bits.
+        assert!((0..0x7c00).map(half).is_sorted());
+    }
 }

@@ -43,6 +43,8 @@ pub enum Attribute {
 #[derive(Clone)]
 pub enum Constant {
     Floats(Vec<usize>, Vec<f32>),
+    /// Bits of floats of 16 bits.
+    Halves(Vec<usize>, Vec<u16>),
     Ints(Vec<usize>, Vec<i64>),
 }
 
@@ -132,6 +134,38 @@ impl Net {
             }
         }
         net
+    }
+
+    /// Cuts the weights to 11 significant bits; with `store`, also writes them as floats of 16 bits, each with a cast to 32.
+    pub fn halve(&mut self, store: bool) {
+        let mut stored = BTreeMap::new();
+        for (name, constant) in &mut self.constants {
+            let Constant::Floats(dims, values) = constant else { continue };
+            // What lies outside of the range of 16 bits becomes 0.
+            let kept = |value: f32| (6.2e-5..6.5e4).contains(&value.abs());
+            let cut = |value: f32| if kept(value) { value.to_bits() & !0x1fff } else { 0 };
+            let half = |bits: u32| {
+                if bits == 0 { 0 } else { (bits >> 16 & 0x8000 | (bits & 0x7fff_ffff) - (112 << 23) >> 13) as u16 }
+            };
+            stored.insert(name.clone(), (dims.clone(), values.iter().map(|value| half(cut(*value))).collect()));
+            values.iter_mut().for_each(|value| *value = f32::from_bits(cut(*value)));
+        }
+        if store {
+            for (name, (dims, bits)) in stored {
+                let half = format!("{name}_half");
+                self.constants.remove(&name);
+                self.constants.insert(half.clone(), Constant::Halves(dims, bits));
+                let attributes = vec![("to", Attribute::Int(1))];
+                let cast = Node {
+                    name: format!("{name}_cast"),
+                    op: "Cast",
+                    inputs: vec![half],
+                    outputs: vec![name],
+                    attributes,
+                };
+                self.nodes.insert(0, cast);
+            }
+        }
     }
 
     fn weights(&mut self, dims: Vec<usize>, scale: f32, offset: f32) -> String {

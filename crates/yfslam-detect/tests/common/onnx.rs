@@ -53,6 +53,7 @@ fn node(node: &Node, out: &mut Vec<u8>) {
 fn constant(name: &str, value: &Constant, out: &mut Vec<u8>) {
     let (dims, data_type, raw): (_, _, Vec<u8>) = match value {
         Constant::Floats(dims, values) => (dims, 1, values.iter().flat_map(|value| value.to_le_bytes()).collect()),
+        Constant::Halves(dims, values) => (dims, 10, values.iter().flat_map(|value| value.to_le_bytes()).collect()),
         Constant::Ints(dims, values) => (dims, 7, values.iter().flat_map(|value| value.to_le_bytes()).collect()),
     };
     dims.iter().for_each(|dim| int(1, *dim as i64, out));

@@ -19,6 +19,7 @@ impl Net {
         for (name, constant) in &self.constants {
             let (dims, data) = match constant {
                 Constant::Floats(dims, data) => (dims, data.iter().map(|value| f64::from(*value)).collect()),
+                Constant::Halves(..) => unreachable!("the reference computes networks in full precision"),
                 Constant::Ints(dims, data) => (dims, data.iter().map(|value| *value as f64).collect()),
             };
             values.insert(name.clone(), Tensor { dims: dims.clone(), data });

@@ -1,0 +1,149 @@
+//! Where the boxes of movable objects come from, and one detector for several methods.
+//!
+//! In: what the user named. Out: for one method the detector itself, which then runs beside feature extraction; for several the frames
+//! with their boxes, found once.
+
+use std::fmt;
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+
+use anyhow::{Result, bail};
+use serde::Serialize;
+use yfslam::dynamic::Method;
+use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError};
+
+use crate::cpu;
+use crate::detector::{self, DetectorArgs, LoadedDetector, ModelIdentity, Took};
+use crate::pipeline::Stages;
+use crate::settings::describe;
+use crate::source::SourceArgs;
+use crate::terminal::Terminal;
+
+/// Where the boxes of movable objects come from.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BoxOrigin {
+    /// The method needs none.
+    None,
+    /// The synthetic world knows them.
+    Renderer,
+    /// The `boxes.json` of the folder.
+    Folder,
+    /// A network.
+    Detector(ModelIdentity),
+}
+
+impl BoxOrigin {
+    /// Whether they come with the frames.
+    pub fn is_source(&self) -> bool {
+        matches!(self, Self::Renderer | Self::Folder)
+    }
+}
+
+impl fmt::Display for BoxOrigin {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::None => f.write_str("none needed"),
+            Self::Renderer => f.write_str("exact, from the renderer"),
+            Self::Folder => f.write_str("exact, from the recording's boxes.json"),
+            Self::Detector(model) => {
+                let file = model.file.file_name().unwrap_or(model.file.as_os_str()).to_string_lossy();
+                write!(f, "{file} (CRC-32 {})", model.crc32)
+            }
+        }
+    }
+}
+
+/// The origin of the boxes that `methods` need, and the detector if it is one.
+///
+/// # Errors
+/// There is no origin, or the detector cannot be used.
+pub fn choose(
+    args: &DetectorArgs,
+    source: &SourceArgs,
+    config: &Config,
+    methods: &[Method],
+    terminal: Terminal,
+) -> Result<(BoxOrigin, Option<LoadedDetector>)> {
+    let Some(method) = methods.iter().find(|method| **method != Method::None) else {
+        return Ok((BoxOrigin::None, None));
+    };
+    if let Some(file) = &args.detector {
+        let loaded = detector::load(args, file, config)?;
+        return Ok((BoxOrigin::Detector(loaded.identity.clone()), Some(loaded)));
+    }
+    if source.is_synthetic() {
+        terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
+        return Ok((BoxOrigin::Renderer, None));
+    }
+    if source.knows_boxes() {
+        terminal.note("no --detector: the boxes of people come from the folder's boxes.json");
+        return Ok((BoxOrigin::Folder, None));
+    }
+    let (name, _) = describe(*method);
+    bail!(
+        "method {name} keeps people out and needs a network that finds them; give --detector FILE.onnx (YOLO-FastestV2 as \
+         ONNX with six raw outputs: the official COCO weights or your own training), or --method none to trust every feature"
+    )
+}
+
+/// A detector that sees each frame once, for several methods.
+pub struct SharedDetector {
+    detector: Box<dyn Detector>,
+    times: Receiver<Took>,
+    /// Indices of the classes that can move.
+    movable: Vec<usize>,
+    found: Vec<Detection>,
+    tally: DetectionTally,
+}
+
+/// What it took to find boxes for several methods at once.
+#[derive(Clone, Debug)]
+pub struct DetectionTally {
+    pub stages: Stages,
+    /// Processor time; `None` where the system does not tell.
+    pub cpu: Option<Duration>,
+    /// Frames on which the detector failed; they count as frames without boxes.
+    pub failures: usize,
+}
+
+impl Default for DetectionTally {
+    fn default() -> Self {
+        Self { stages: Stages::default(), cpu: cpu::thread_time().map(|_| Duration::ZERO), failures: 0 }
+    }
+}
+
+impl SharedDetector {
+    /// Takes over a detector that is to report the classes of `dynamic.movable`.
+    ///
+    /// # Errors
+    /// It does not know one of them.
+    pub fn new(LoadedDetector { detector, times, .. }: LoadedDetector, config: &Config) -> Result<Self, SetupError> {
+        let known = detector.class_names();
+        let index = |name: &String| {
+            let unknown = || SetupError::UnknownClass { name: name.clone(), known: known.join(", ") };
+            known.iter().position(|k| k == name).ok_or_else(unknown)
+        };
+        let movable = config.dynamic.movable.iter().map(index).collect::<Result<_, _>>()?;
+        Ok(Self { detector, times, movable, found: Vec::new(), tally: DetectionTally::default() })
+    }
+
+    /// Puts its boxes into the frame.
+    pub fn see(&mut self, frame: &mut RgbdFrame) {
+        if let Err(error) = self.detector.detect(&frame.color, &mut self.found) {
+            tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
+            self.found.clear();
+            self.tally.failures += 1;
+        }
+        for took in self.times.try_iter() {
+            self.tally.stages.push("detector", took.wall);
+            self.tally.cpu = self.tally.cpu.zip(took.cpu).map(|(sum, took)| sum + took);
+        }
+        frame.detections = Some(self.found.iter().filter(|d| self.movable.contains(&d.class)).copied().collect());
+    }
+
+    /// What it took.
+    pub fn into_tally(self) -> DetectionTally {
+        self.tally
+    }
+}

@@ -1,0 +1,110 @@
+//! What a run tells at its end, on the terminal: one method in words, several as a table.
+
+use std::fmt::Write;
+
+use anyhow::Result;
+use yfslam_eval::{Table, TableStyle, improvement_percent};
+
+use crate::boxes::BoxOrigin;
+use crate::lane::Judged;
+use crate::pipeline::PlaceTally;
+use crate::report::{Report, Run};
+use crate::settings::describe;
+use crate::source::{Source, Truth};
+
+/// What became of the frames of one method, in a few lines.
+pub fn of_one(report: &Report, run: &Run) -> Result<String> {
+    let Run { source, judged: Judged { outcome, .. }, .. } = run;
+    let frames = &outcome.frames;
+    let mut text = format!(
+        "{}: tracked {} of {} frames ({:.1} %), lost {}, skipped {}; {:.1} frames a second\n",
+        source.name,
+        frames.tracked,
+        frames.total(),
+        frames.tracked_percent(),
+        frames.lost,
+        frames.skipped,
+        report.fps
+    );
+    if frames.skipped > 0 {
+        let reasons: Vec<_> =
+            frames.skipped_by_reason.iter().map(|(reason, count)| format!("{count} × {reason}")).collect();
+        writeln!(
+            text,
+            "skipped: {}; the first: {}",
+            reasons.join(", "),
+            frames.first_skipped.as_deref().unwrap_or("-")
+        )?;
+    }
+    if let Some(a) = &report.association
+        && a.duplicate_stamps_skipped + a.backward_stamps_skipped + a.unstamped_skipped > 0
+    {
+        let (duplicate, backward, unstamped) =
+            (a.duplicate_stamps_skipped, a.backward_stamps_skipped, a.unstamped_skipped);
+        writeln!(
+            text,
+            "list entries skipped: {duplicate} × duplicate stamp, {backward} × stamp runs backward, {unstamped} × no stamp"
+        )?;
+    }
+    if frames.detector_failures > 0 {
+        writeln!(
+            text,
+            "the detector failed on {} frames, which count as frames without boxes",
+            frames.detector_failures
+        )?;
+    }
+    places_summary(&mut text, &outcome.places)?;
+    write!(text, "map: {} keyframes, {} landmarks", report.map.keyframes, report.map.landmarks)?;
+    if let Some(peak) = report.peak_memory_mb {
+        write!(text, "; peak memory {peak:.0} MB")?;
+    }
+    Ok(text + "\n")
+}
+
+fn places_summary(text: &mut String, places: &PlaceTally) -> Result<()> {
+    if !places.loops.is_empty() {
+        let drifts: Vec<_> = places.loops.iter().map(|l| format!("{:.2} m", l.drift_m)).collect();
+        writeln!(text, "loops closed: {}, after a drift of {}", places.loops.len(), drifts.join(", "))?;
+    }
+    if let Some(longest) = places.lost.iter().map(|stretch| stretch.frames).max() {
+        let found = places.lost.iter().filter(|stretch| stretch.found_again).count();
+        writeln!(text, "lost {} times, found again {found} times; for {longest} frames at most", places.lost.len())?;
+    }
+    Ok(())
+}
+
+/// The errors side by side, as in Table 2 of the paper.
+pub fn of_several(judged: &[Judged], source: &Source, truth: Option<&Truth>) -> String {
+    let headers =
+        ["ATE (m)", "RMSE", "S.D.", "mean", "median", "max", "improve RMSE (%)", "S.D. (%)", "frames tracked"];
+    let mut table = Table::new(headers);
+    let errors_of = |judged: &Judged| judged.evaluation().map(|e| e.ate.translation_m);
+    let original = judged.first().and_then(errors_of);
+    for (place, one) in judged.iter().enumerate() {
+        let Judged { config, outcome, .. } = one;
+        let (name, summary) = describe(config.dynamic.method);
+        let errors = errors_of(one);
+        let figures = match errors {
+            Some(s) => [s.rmse, s.std, s.mean, s.median, s.max].map(|v| format!("{v:.4}")),
+            None => std::array::from_fn(|_| "-".to_owned()),
+        };
+        let improvement = match errors.zip(original) {
+            Some((ours, original)) if place > 0 => {
+                [(ours.rmse, original.rmse), (ours.std, original.std)].map(|(ours, original)| {
+                    improvement_percent(ours, original).map_or("-".to_owned(), |percent| format!("{percent:.2}"))
+                })
+            }
+            _ => Default::default(),
+        };
+        let tracked = format!("{} of {}", outcome.frames.tracked, outcome.frames.total());
+        table.push([format!("{name}: {summary}")].into_iter().chain(figures).chain(improvement).chain([tracked]));
+    }
+    let boxes = judged.iter().map(|one| one.boxes).find(|boxes| !matches!(boxes, BoxOrigin::None));
+    let truth = truth.map_or("none", |truth| truth.origin.as_str());
+    format!(
+        "{}; boxes: {}; ground truth: {truth}\n\n{}",
+        source.name,
+        boxes.unwrap_or(&BoxOrigin::None),
+        table.render(TableStyle::Plain)
+    )
+}

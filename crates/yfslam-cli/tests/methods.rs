@@ -1,0 +1,94 @@
+//! Several methods in one run: each with the results it has alone, and none hindered by another.
+#![allow(clippy::unwrap_used, reason = "a test may")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{fails, record, report, succeeds};
+
+/// People who walk through the picture, small enough to be quick.
+const WALKING: &str = "synth:walking_xyz?people=2&share=0.3&width=320&height=240&frames=30";
+
+const METHODS: [&str; 3] = ["none", "boxes", "yf"];
+
+/// Runs all methods together and each alone, and compares what depends on the input and the configuration alone.
+fn assert_same_together_and_alone(folder: &Path, args: &[&str]) {
+    succeeds(folder, &[args, &["--method", "none,boxes,yf,none", "--out", "all", "-q"]].concat());
+    for method in METHODS {
+        succeeds(folder, &[args, &["--method", method, "--out", method, "-q"]].concat());
+        let (together, alone) = (folder.join("all").join(method), folder.join(method));
+        for name in ["trajectory.txt", "keyframes.txt", "live.txt", "map.ply", "config.toml"] {
+            assert_eq!(fs::read(together.join(name)).unwrap(), fs::read(alone.join(name)).unwrap(), "{method}: {name}");
+        }
+        let (together, alone) = (report(&together), report(&alone));
+        for key in ["evaluation", "frames", "boxes", "config", "places", "map"] {
+            assert_eq!(together[key], alone[key], "{method}: {key}");
+        }
+        assert_eq!(together["dynamic"]["dynamic_features"], alone["dynamic"]["dynamic_features"], "{method}");
+    }
+}
+
+#[test]
+fn methods_run_together_leave_what_each_leaves_alone_faults_included() {
+    let folder = tempfile::tempdir().unwrap();
+    let faults = ["--fault", "repeated@0.3+0.1", "--fault", "covered@0.6+0.1", "--overlay"];
+    assert_same_together_and_alone(folder.path(), &[&["run", WALKING][..], &faults].concat());
+    for method in METHODS {
+        let pictures = fs::read_dir(folder.path().join("all").join(method).join("overlay")).unwrap();
+        assert!(pictures.count() > 20, "{method}");
+    }
+    assert!(!folder.path().join("all/report.html").exists() && !folder.path().join("all/trajectory.txt").exists());
+}
+
+#[test]
+fn a_recording_is_compared_as_a_world_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = WALKING.trim_start_matches("synth:");
+    succeeds(folder.path(), &["synth", world, "--out", "rec", "-q"]);
+    let output = succeeds(folder.path(), &["run", "rec", "--method", "none,yf", "--report", "--out", "out"]);
+    for words in ["boxes: exact, from the recording's boxes.json", "improve RMSE (%)", "30 of 30"] {
+        assert!(output.stdout.contains(words), "no '{words}' in {}", output.stdout);
+    }
+    let html = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(html.contains("Configuration of none") && html.contains("Configuration of yf"));
+}
+
+#[test]
+fn a_method_that_fails_says_why_in_its_folder_and_does_not_stop_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    record(&folder.path().join("seq"));
+    // A file where pictures should go.
+    fs::create_dir_all(folder.path().join("out/none")).unwrap();
+    fs::write(folder.path().join("out/none/overlay"), "").unwrap();
+    // Boxes of nobody: the method runs, and needs no network.
+    fs::write(folder.path().join("seq/boxes.json"), r#"{"classes":["person"],"frames":[]}"#).unwrap();
+    let args = ["run", "seq", "--overlay", "--out", "out"];
+    let output = succeeds(folder.path(), &[&args[..], &["--method", "none,yf"]].concat());
+    assert!(output.stderr.contains("warning: none: ") && output.stderr.contains("overlay"), "{}", output.stderr);
+    assert_eq!(report(&folder.path().join("out/yf"))["frames"]["tracked"], 12);
+    assert!(!folder.path().join("out/none/run.json").exists());
+    let failure = folder.path().join("out/none/failure.txt");
+    assert!(fs::read_to_string(&failure).unwrap().contains("overlay"));
+    fs::remove_file(folder.path().join("out/none/overlay")).unwrap();
+    succeeds(folder.path(), &[&args[..], &["--method", "none,yf"]].concat());
+    assert!(!failure.exists());
+    // Faulty frames fail every method.
+    let black = [&args[..], &["--method", "none,yf", "--fault", "black@0+9"]].concat();
+    fails(folder.path(), &black, &["none: no trajectory", "yf: no trajectory", "no method has a trajectory"]);
+}
+
+#[test]
+fn options_for_one_method_are_refused_with_several() {
+    let folder = tempfile::tempdir().unwrap();
+    for (options, word) in [
+        (&["--save-map", "a.map"][..], "--save-map"),
+        (&["--threaded"], "--threaded"),
+        (&["--load-map", "a.map", "--localise"], "--load-map"),
+    ] {
+        let args = [&["run", WALKING, "--method", "none,yf"], options].concat();
+        fails(folder.path(), &args, &[word, "several methods", "give one --method"]);
+    }
+    fails(folder.path(), &["run", WALKING, "--method", "none,orb"], &["orb", "boxes"]);
+}
