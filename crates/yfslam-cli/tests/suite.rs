@@ -36,11 +36,11 @@ fn bench(folder: &Path, specs: &[String], methods: &str, frames: &str, out: &str
     paths.iter().map(|path| serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()).collect()
 }
 
-/// Error of `none` and of `yf` in the motions of an activity, with its name.
-fn errors(folder: &Path, activity: &str) -> Vec<(String, f64, f64)> {
+/// Error of `none` and of `yf` in the motions of an activity, in a form of so many frames, with its name.
+fn errors(folder: &Path, activity: &str, form: &str, frames: &str) -> Vec<(String, f64, f64)> {
     let names: Vec<String> = ["static", "xyz", "rpy", "halfsphere"].map(|motion| format!("{activity}_{motion}")).into();
-    let specs: Vec<String> = names.iter().map(|name| format!("{name}{SHORT}")).collect();
-    let cells = bench(folder, &specs, "none,yf", LONG_FRAMES, activity);
+    let specs: Vec<String> = names.iter().map(|name| format!("{name}{form}")).collect();
+    let cells = bench(folder, &specs, "none,yf", frames, activity);
     let error = |name: &str, method: &str| {
         let of = |cell: &&Value| {
             cell["method"] == method && cell["sequence"].as_str().is_some_and(|sequence| sequence.starts_with(name))
@@ -71,7 +71,7 @@ fn worlds_are_tracked_within_5_cm_in_nine_frames_of_ten() {
 #[test]
 fn without_a_filter_walkers_lead_the_camera_astray_by_20_cm_or_ten_times_as_far_as_with_it() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, none, yf) in errors(folder.path(), "walking") {
+    for (name, none, yf) in errors(folder.path(), "walking", SHORT, LONG_FRAMES) {
         assert!(none > 0.2 || none >= 10.0 * yf, "{name}: none {none} m, yf {yf} m");
         assert!(yf < 0.03, "{name}: yf {yf} m");
     }
@@ -80,7 +80,8 @@ fn without_a_filter_walkers_lead_the_camera_astray_by_20_cm_or_ten_times_as_far_
 #[test]
 fn where_people_sit_the_filter_makes_a_difference_of_2_mm_at_most_or_a_tenth() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, none, yf) in errors(folder.path(), "sitting") {
+    // At half the size both err by 1 cm and more, and the difference is chance.
+    for (name, none, yf) in errors(folder.path(), "sitting", "", "120") {
         assert!((none - yf).abs() <= (0.1 * none).max(0.002), "{name}: none {none} m, yf {yf} m");
     }
 }
