@@ -12,7 +12,7 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let image = yfslam::image::RgbImage::new(640, 480);
-//! let mut detector = YoloFastestV2::load("model.onnx".as_ref(), &DetectorConfig::default())?;
+//! let mut detector = YoloFastestV2::load("model.onnx".as_ref(), &DetectorConfig::default())?; // or YoloFastestV2::embedded
 //! let mut found = Vec::new();
 //! detector.detect(&image, &mut found)?;
 //! # Ok(()) }
@@ -21,6 +21,7 @@
 
 mod config;
 mod decode;
+mod embedded;
 mod error;
 mod graph;
 mod kernels;
@@ -32,6 +33,7 @@ mod preprocess;
 mod yolo;
 
 pub use config::DetectorConfig;
+pub use embedded::EMBEDDED_MODEL;
 pub use error::ModelError;
 pub use fearless_simd::Level;
 pub use kernels::available_levels;

@@ -145,7 +145,8 @@ impl Net {
             let kept = |value: f32| (6.2e-5..6.5e4).contains(&value.abs());
             let cut = |value: f32| if kept(value) { value.to_bits() & !0x1fff } else { 0 };
             let half = |bits: u32| {
-                if bits == 0 { 0 } else { (bits >> 16 & 0x8000 | (bits & 0x7fff_ffff) - (112 << 23) >> 13) as u16 }
+                let magnitude = (bits & 0x7fff_ffff).saturating_sub(112 << 23) >> 13;
+                (bits >> 16 & 0x8000 | magnitude) as u16
             };
             stored.insert(name.clone(), (dims.clone(), values.iter().map(|value| half(cut(*value))).collect()));
             values.iter_mut().for_each(|value| *value = f32::from_bits(cut(*value)));
