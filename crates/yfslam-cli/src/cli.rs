@@ -4,13 +4,14 @@ use std::sync::LazyLock;
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 
-use crate::command::{bench, completions, config, demo, eval, info, run, synth};
+use crate::command::{bench, completions, config, demo, detect, eval, info, run, synth};
 use crate::detector::describe_embedded;
 
 const EXAMPLES: &str = "\
 Examples:
   yfslam demo                                        what it does, on any machine, without data
   yfslam run rgbd_bonn_crowd --camera bonn
+  yfslam detect photo.jpg --pictures
   yfslam eval groundtruth.txt yfslam-out/rgbd_bonn_crowd/trajectory.txt";
 
 /// RGB-D SLAM for scenes in which people walk: frames in, the camera's trajectory out.
@@ -45,6 +46,7 @@ pub enum Command {
     Run(Box<run::RunArgs>),
     Eval(eval::EvalArgs),
     Demo(demo::DemoArgs),
+    Detect(detect::DetectArgs),
     Synth(synth::SynthArgs),
     Bench(bench::BenchArgs),
     Info(info::InfoArgs),

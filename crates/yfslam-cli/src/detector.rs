@@ -25,7 +25,7 @@ const EMBEDDED: &str = "embedded";
 #[command(next_help_heading = "System")]
 pub struct DetectorArgs {
     /// Network that finds people: `embedded`, the one in this program, or a file, YOLO-FastestV2 as ONNX with its six raw outputs
-    /// [default: embedded, unless a synthetic world or a boxes.json knows the boxes].
+    /// [default: embedded; but in `run` the boxes of a synthetic world or a boxes.json].
     #[arg(long, value_name = "FILE.onnx|embedded")]
     pub detector: Option<Model>,
     /// Names of the network's classes, in its order [default: those in the file, else those of COCO].
