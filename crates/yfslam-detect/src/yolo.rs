@@ -13,8 +13,8 @@ use crate::plan::Plan;
 use crate::preprocess::Stretch;
 use crate::{ModelError, graph};
 
-/// The detector network, loaded and ready. It runs on the calling thread and allocates nothing per image once the first one of
-/// a size has passed.
+/// The detector network, loaded and ready. It runs on the calling thread and, once the first image of a size has passed, allocates
+/// nothing but what the caller's list needs to grow.
 #[derive(Debug)]
 pub struct YoloFastestV2 {
     plan: Plan,
@@ -78,7 +78,9 @@ impl YoloFastestV2 {
                 class_names.len()
             )));
         }
-        Ok(Self { plan, grids, config, class_names, stretch: Stretch::default(), candidates: Vec::new() })
+        // Room for a box of every anchor in every cell.
+        let candidates = Vec::with_capacity(grids.iter().map(|grid| grid.most_candidates(&plan)).sum());
+        Ok(Self { plan, grids, config, class_names, stretch: Stretch::default(), candidates })
     }
 
     /// Uses the instruction set `level` instead of the best one, to compare and to test.
