@@ -112,12 +112,14 @@ pub fn load_for(args: &DetectorArgs, config: &Config) -> Result<LoadedDetector> 
 /// The file cannot be read, is no ONNX model, or holds another network.
 pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetector> {
     let config = DetectorConfig { class_names: args.detector_classes.clone(), ..config };
-    let (network, file, bytes) = match &args.detector {
-        None | Some(Model::Embedded) => (YoloFastestV2::embedded(&config)?, EMBEDDED.into(), EMBEDDED_MODEL.into()),
+    let (network, file, bytes): (Box<dyn Detector>, _, _) = match &args.detector {
+        None | Some(Model::Embedded) => {
+            (Box::new(YoloFastestV2::embedded(&config)?), EMBEDDED.into(), EMBEDDED_MODEL.into())
+        }
         Some(Model::File(file)) => {
             let bytes = std::fs::read(file)
                 .with_context(|| format!("cannot read the detector {}; check the path", file.display()))?;
-            let network = YoloFastestV2::from_bytes(&file.display().to_string(), &bytes, &config)?;
+            let network = yfslam_detect::load(&file.display().to_string(), &bytes, &config)?;
             (network, file.clone(), Cow::from(bytes))
         }
     };
@@ -133,7 +135,7 @@ pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetecto
 
 /// Tells how long each image took.
 struct Timed {
-    network: YoloFastestV2,
+    network: Box<dyn Detector>,
     times: Sender<Took>,
 }
 

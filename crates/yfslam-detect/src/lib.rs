@@ -17,14 +17,19 @@
 //! detector.detect(&image, &mut found)?;
 //! # Ok(()) }
 //! ```
+//!
+//! With the feature `rten`, `AnyYolo` runs YOLO networks of other architectures, slower and on all cores; [`load()`] takes whatever there is.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "rten")]
+mod any_yolo;
 mod config;
 mod decode;
 mod embedded;
 mod error;
 mod graph;
 mod kernels;
+mod load;
 mod memory;
 mod onnx;
 mod places;
@@ -32,9 +37,12 @@ mod plan;
 mod preprocess;
 mod yolo;
 
+#[cfg(feature = "rten")]
+pub use any_yolo::AnyYolo;
 pub use config::DetectorConfig;
 pub use embedded::EMBEDDED_MODEL;
 pub use error::ModelError;
 pub use fearless_simd::Level;
 pub use kernels::available_levels;
+pub use load::load;
 pub use yolo::{RawOutput, YoloFastestV2};

@@ -78,19 +78,16 @@ pub struct Size {
 }
 
 impl Net {
+    /// A network without nodes; its input is called `image`.
+    pub fn empty(height: usize, width: usize) -> Self {
+        let (nodes, constants, outputs, metadata) = Default::default();
+        Net { height, width, nodes, constants, outputs, metadata, style: Style::Folded, random: 0 }
+    }
+
     /// The whole architecture.
     pub fn yolo(size: &Size, style: Style, seed: u64) -> Self {
         let &Size { height, width, channels, classes } = size;
-        let mut net = Net {
-            height,
-            width,
-            nodes: Vec::new(),
-            constants: BTreeMap::new(),
-            outputs: Vec::new(),
-            metadata: Vec::new(),
-            style,
-            random: seed,
-        };
+        let mut net = Net { style, random: seed, ..Net::empty(height, width) };
         let stem = net.conv("image", (3, channels), 3, 2, 1);
         let stem = net.relu(&stem);
         let mut x = net.node(
