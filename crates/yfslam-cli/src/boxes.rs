@@ -7,7 +7,7 @@ use std::fmt;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use serde::Serialize;
 use yfslam::dynamic::Method;
 use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError};
@@ -15,7 +15,6 @@ use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError};
 use crate::cpu;
 use crate::detector::{self, DetectorArgs, LoadedDetector, ModelIdentity, Took};
 use crate::pipeline::Stages;
-use crate::settings::describe;
 use crate::source::SourceArgs;
 use crate::terminal::Terminal;
 
@@ -46,10 +45,7 @@ impl fmt::Display for BoxOrigin {
             Self::None => f.write_str("none needed"),
             Self::Renderer => f.write_str("exact, from the renderer"),
             Self::Folder => f.write_str("exact, from the recording's boxes.json"),
-            Self::Detector(model) => {
-                let file = model.file.file_name().unwrap_or(model.file.as_os_str()).to_string_lossy();
-                write!(f, "{file} (CRC-32 {})", model.crc32)
-            }
+            Self::Detector(model) => model.fmt(f),
         }
     }
 }
@@ -57,7 +53,7 @@ impl fmt::Display for BoxOrigin {
 /// The origin of the boxes that `methods` need, and the detector if it is one.
 ///
 /// # Errors
-/// There is no origin, or the detector cannot be used.
+/// The detector cannot be used.
 pub fn choose(
     args: &DetectorArgs,
     source: &SourceArgs,
@@ -65,26 +61,22 @@ pub fn choose(
     methods: &[Method],
     terminal: Terminal,
 ) -> Result<(BoxOrigin, Option<LoadedDetector>)> {
-    let Some(method) = methods.iter().find(|method| **method != Method::None) else {
+    if methods.iter().all(|method| *method == Method::None) {
         return Ok((BoxOrigin::None, None));
-    };
-    if let Some(file) = &args.detector {
-        let loaded = detector::load(args, file, config)?;
-        return Ok((BoxOrigin::Detector(loaded.identity.clone()), Some(loaded)));
     }
-    if source.is_synthetic() {
+    if args.detector.is_none() && source.is_synthetic() {
         terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
         return Ok((BoxOrigin::Renderer, None));
     }
-    if source.knows_boxes() {
+    if args.detector.is_none() && source.knows_boxes() {
         terminal.note("no --detector: the boxes of people come from the folder's boxes.json");
         return Ok((BoxOrigin::Folder, None));
     }
-    let (name, _) = describe(*method);
-    bail!(
-        "method {name} keeps people out and needs a network that finds them; give --detector FILE.onnx (YOLO-FastestV2 as \
-         ONNX with six raw outputs: the official COCO weights or your own training), or --method none to trust every feature"
-    )
+    let loaded = detector::load_for(args, config)?;
+    if args.detector.is_none() {
+        terminal.note("no --detector: people are found by the network in this program");
+    }
+    Ok((BoxOrigin::Detector(loaded.identity.clone()), Some(loaded)))
 }
 
 /// A detector that sees each frame once, for several methods.

@@ -1,23 +1,33 @@
 //! The command line: one definition per flag, from which parsing, help and completions follow.
 
+use std::sync::LazyLock;
+
 use clap::{ArgAction, Args, Parser, Subcommand};
 
-use crate::command::{bench, completions, config, demo, eval, info, run, synth};
+use crate::command::{bench, completions, config, demo, detect, eval, info, run, synth};
+use crate::detector::describe_embedded;
 
 const EXAMPLES: &str = "\
 Examples:
   yfslam demo                                        what it does, on any machine, without data
-  yfslam run rgbd_bonn_crowd --camera bonn --detector yolo-fastestv2.onnx
+  yfslam run rgbd_bonn_crowd --camera bonn
+  yfslam detect photo.jpg --pictures
   yfslam eval groundtruth.txt yfslam-out/rgbd_bonn_crowd/trajectory.txt";
 
 /// RGB-D SLAM for scenes in which people walk: frames in, the camera's trajectory out.
 #[derive(Debug, Parser)]
-#[command(name = "yfslam", version, after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "yfslam", version, long_version = long_version(), after_help = EXAMPLES, arg_required_else_help = true)]
 pub struct Cli {
     #[command(flatten)]
     pub verbosity: Verbosity,
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// The version, and which network is embedded.
+fn long_version() -> &'static str {
+    static TEXT: LazyLock<String> = LazyLock::new(|| format!("{}\n{}", env!("CARGO_PKG_VERSION"), describe_embedded()));
+    &TEXT
 }
 
 /// How much is said on the way.
@@ -36,6 +46,7 @@ pub enum Command {
     Run(Box<run::RunArgs>),
     Eval(eval::EvalArgs),
     Demo(demo::DemoArgs),
+    Detect(detect::DetectArgs),
     Synth(synth::SynthArgs),
     Bench(bench::BenchArgs),
     Info(info::InfoArgs),

@@ -1,6 +1,10 @@
-//! The detector that the user named, timed.
+//! The detector that the user named or that comes with the program, timed.
 
-use std::path::{Path, PathBuf};
+use std::borrow::Cow;
+use std::convert::Infallible;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
@@ -9,26 +13,46 @@ use clap::Args;
 use serde::Serialize;
 use yfslam::image::RgbImage;
 use yfslam::{Config, Detection, Detector, DetectorError};
-use yfslam_detect::{DetectorConfig, YoloFastestV2};
+use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, YoloFastestV2};
 
 use crate::cpu;
+
+/// The word for the network that comes with the program.
+const EMBEDDED: &str = "embedded";
 
 /// Which network finds people.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "System")]
 pub struct DetectorArgs {
-    /// Network that finds people: YOLO-FastestV2 as ONNX. Methods `boxes` and `yf` need it on recorded sequences.
-    #[arg(long, value_name = "FILE.onnx")]
-    pub detector: Option<PathBuf>,
+    /// Network that finds people: `embedded`, the one in this program, or a file, YOLO-FastestV2 as ONNX with its six raw outputs
+    /// [default: embedded; but in `run` the boxes of a synthetic world or a boxes.json].
+    #[arg(long, value_name = "FILE.onnx|embedded")]
+    pub detector: Option<Model>,
     /// Names of the network's classes, in its order [default: those in the file, else those of COCO].
     #[arg(long, value_name = "NAME,NAME", value_delimiter = ',', requires = "detector")]
-    detector_classes: Vec<String>,
+    pub detector_classes: Vec<String>,
+}
+
+/// A network.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Model {
+    /// The one in this program.
+    Embedded,
+    File(PathBuf),
+}
+
+impl FromStr for Model {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(if text == EMBEDDED { Self::Embedded } else { Self::File(text.into()) })
+    }
 }
 
 /// Which model found the boxes.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModelIdentity {
-    /// The file.
+    /// The file, or `embedded`.
     pub file: PathBuf,
     /// Its size.
     pub bytes: usize,
@@ -36,6 +60,19 @@ pub struct ModelIdentity {
     pub crc32: String,
     /// Number of classes it knows.
     pub classes: usize,
+}
+
+impl fmt::Display for ModelIdentity {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let name = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
+        write!(f, "{name} network (CRC-32 {}, {} kB)", self.crc32, self.bytes.div_ceil(1000))
+    }
+}
+
+/// Which network is in this program, in a line.
+pub fn describe_embedded() -> String {
+    let (crc32, kilobytes) = (crc32fast::hash(EMBEDDED_MODEL), EMBEDDED_MODEL.len().div_ceil(1000));
+    format!("embedded network: CRC-32 {crc32:08x}, {kilobytes} kB")
 }
 
 /// A detector ready to run.
@@ -54,13 +91,11 @@ pub struct Took {
     pub cpu: Option<Duration>,
 }
 
-/// Loads a YOLO-FastestV2 model, set to report every box that the dynamic filter of `config` may use.
+/// Loads a network, set to report every box that the dynamic filter of `config` may use.
 ///
 /// # Errors
-/// The file cannot be read, is no ONNX model, or holds another network.
-pub fn load(args: &DetectorArgs, file: &Path, config: &Config) -> Result<LoadedDetector> {
-    let bytes =
-        std::fs::read(file).with_context(|| format!("cannot read the detector {}; check the path", file.display()))?;
+/// As [`load`].
+pub fn load_for(args: &DetectorArgs, config: &Config) -> Result<LoadedDetector> {
     let score_threshold = config.dynamic.keep_score.min(config.dynamic.open_score);
     ensure!(
         score_threshold > 0.0 && score_threshold < 1.0,
@@ -68,11 +103,28 @@ pub fn load(args: &DetectorArgs, file: &Path, config: &Config) -> Result<LoadedD
         config.dynamic.keep_score,
         config.dynamic.open_score
     );
-    let class_names = args.detector_classes.clone();
-    let detector_config = DetectorConfig { score_threshold, class_names, ..Default::default() };
-    let network = YoloFastestV2::from_bytes(&file.display().to_string(), &bytes, &detector_config)?;
+    load(args, DetectorConfig { score_threshold, ..Default::default() })
+}
+
+/// Loads the network that was named, else the embedded one.
+///
+/// # Errors
+/// The file cannot be read, is no ONNX model, or holds another network.
+pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetector> {
+    let config = DetectorConfig { class_names: args.detector_classes.clone(), ..config };
+    let (network, file, bytes): (Box<dyn Detector>, _, _) = match &args.detector {
+        None | Some(Model::Embedded) => {
+            (Box::new(YoloFastestV2::embedded(&config)?), EMBEDDED.into(), EMBEDDED_MODEL.into())
+        }
+        Some(Model::File(file)) => {
+            let bytes = std::fs::read(file)
+                .with_context(|| format!("cannot read the detector {}; check the path", file.display()))?;
+            let network = yfslam_detect::load(&file.display().to_string(), &bytes, &config)?;
+            (network, file.clone(), Cow::from(bytes))
+        }
+    };
     let identity = ModelIdentity {
-        file: file.into(),
+        file,
         bytes: bytes.len(),
         crc32: format!("{:08x}", crc32fast::hash(&bytes)),
         classes: network.class_names().len(),
@@ -83,7 +135,7 @@ pub fn load(args: &DetectorArgs, file: &Path, config: &Config) -> Result<LoadedD
 
 /// Tells how long each image took.
 struct Timed {
-    network: YoloFastestV2,
+    network: Box<dyn Detector>,
     times: Sender<Took>,
 }
 

@@ -40,6 +40,16 @@ pub fn rectangle(image: &mut RgbImage, [x0, y0]: [i64; 2], [x1, y1]: [i64; 2], t
     }
 }
 
+/// The box between two corners, filled.
+pub fn bar(image: &mut RgbImage, [x0, y0]: [i64; 2], [x1, y1]: [i64; 2], color: Color) {
+    let (width, height) = (image.width() as i64, image.height() as i64);
+    for y in y0.max(0)..=y1.min(height) {
+        for x in x0.max(0)..=x1.min(width) {
+            point(image, x, y, color);
+        }
+    }
+}
+
 /// A filled disc.
 pub fn disc(image: &mut RgbImage, [x, y]: [f32; 2], radius: f32, color: Color) {
     ring(image, [x, y], 0.0, radius, color);

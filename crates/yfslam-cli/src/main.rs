@@ -12,6 +12,7 @@ mod command;
 mod cpu;
 mod detector;
 mod draw;
+mod found;
 mod html;
 mod lane;
 mod map;

@@ -36,12 +36,7 @@ impl Overlay {
     /// An old picture cannot be removed.
     pub fn prepare(out: &Path, open_score: f32) -> Result<Self> {
         let folder = out.join("overlay");
-        for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
-            if is_picture(&entry.file_name().to_string_lossy()) {
-                let path = entry.path();
-                std::fs::remove_file(&path).with_context(|| format!("cannot remove the old {}", path.display()))?;
-            }
-        }
+        remove_pictures(&folder, is_picture)?;
         Ok(Self { folder, open_score })
     }
 
@@ -53,6 +48,20 @@ impl Overlay {
         let image = picture(frame, slam, self.open_score);
         Ok(write_color_png(&self.folder.join(format!("{index:06}.png")), &image)?)
     }
+}
+
+/// Removes the files of an earlier run, whose names are `ours`, from a folder that need not be there.
+///
+/// # Errors
+/// One cannot be removed.
+pub fn remove_pictures(folder: &Path, ours: impl Fn(&str) -> bool) -> Result<()> {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        if ours(&entry.file_name().to_string_lossy()) {
+            let path = entry.path();
+            std::fs::remove_file(&path).with_context(|| format!("cannot remove the old {}", path.display()))?;
+        }
+    }
+    Ok(())
 }
 
 /// The picture of the frame that `slam` saw last; boxes from `open_score` on open a track.

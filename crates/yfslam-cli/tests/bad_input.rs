@@ -202,21 +202,18 @@ fn ground_truth_of_another_recording_fails_the_run_but_not_its_trajectory() {
 }
 
 #[test]
-fn without_a_detector_the_error_says_how_to_go_on() {
-    let folder = recording();
-    for method in ["yf", "boxes"] {
-        let words = [method, "--detector FILE.onnx", "--method none"];
-        fails(folder.path(), &["run", "seq", "--method", method], &words);
-    }
-}
-
-#[test]
 fn an_unreadable_or_foreign_network_is_refused() {
     let folder = recording();
     fs::write(folder.path().join("text.onnx"), "This is not a network.").unwrap();
     let run = |file, words: &[&str]| fails(folder.path(), &["run", "seq", "--detector", file], words);
     run("nowhere.onnx", &["nowhere.onnx", "check the path"]);
     run("text.onnx", &["text.onnx", "not a readable ONNX model", "export it again"]);
+    // A class that the network in this program does not know, with its own thread and with one for several methods.
+    fs::write(folder.path().join("c.toml"), "[dynamic]\nmovable = [\"unicorn\"]\n").unwrap();
+    for method in ["yf", "boxes,yf"] {
+        let args = ["run", "seq", "--config", "c.toml", "--method", method];
+        fails(folder.path(), &args, &["dynamic.movable", "'unicorn'", "it knows: person"]);
+    }
     // A valid protobuf without a graph.
     fs::write(folder.path().join("bare.onnx"), [0x08, 0x08]).unwrap();
     run("bare.onnx", &["bare.onnx"]);

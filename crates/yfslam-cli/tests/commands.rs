@@ -93,7 +93,7 @@ fn the_printed_configuration_is_one_that_a_run_takes() {
 fn help_names_every_command_and_completions_exist_for_every_shell() {
     let folder = tempfile::tempdir().unwrap();
     let help = succeeds(folder.path(), &["--help"]).stdout;
-    for command in ["run", "eval", "demo", "synth", "bench", "info", "config", "completions"] {
+    for command in ["run", "eval", "demo", "detect", "synth", "bench", "info", "config", "completions"] {
         assert!(help.contains(&format!("  {command} ")), "{help}");
         let own = succeeds(folder.path(), &[command, "--help"]).stdout;
         assert!(own.contains("Examples:"), "{own}");

@@ -43,6 +43,30 @@ fn methods_run_together_leave_what_each_leaves_alone_faults_included() {
 }
 
 #[test]
+fn methods_share_a_detector_and_leave_what_each_leaves_with_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_same_together_and_alone(folder.path(), &["run", WALKING, "--detector", "embedded"]);
+    let all = folder.path().join("all");
+    let detections = |method: &str| report(&all.join(method))["times"]["detector"]["count"].as_u64();
+    assert_eq!(METHODS.map(detections), [None, Some(30), Some(30)]);
+    assert_eq!(report(&all.join("yf"))["boxes"]["detector"]["file"], "embedded");
+    assert_eq!(report(&all.join("none"))["boxes"], "none");
+    // The network sees something of what the renderer knows.
+    assert!(report(&all.join("yf"))["dynamic"]["dynamic_features"].as_u64().unwrap() > 0);
+}
+
+#[test]
+fn a_recording_without_boxes_is_looked_at_by_the_network_in_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    record(&folder.path().join("seq"));
+    let output = succeeds(folder.path(), &["run", "seq", "--out", "out"]);
+    assert!(output.stderr.contains("the network in this program"), "{}", output.stderr);
+    let identity = report(&folder.path().join("out"))["boxes"]["detector"].clone();
+    let version = succeeds(folder.path(), &["--version"]).stdout;
+    assert!(version.contains(identity["crc32"].as_str().unwrap()), "{version} {identity}");
+}
+
+#[test]
 fn a_recording_is_compared_as_a_world_is() {
     let folder = tempfile::tempdir().unwrap();
     let world = WALKING.trim_start_matches("synth:");

@@ -61,6 +61,12 @@ impl Grid {
         Ok((grids, class_count.unwrap_or(0)))
     }
 
+    /// How many boxes [`Grid::candidates`] can find.
+    pub(crate) fn most_candidates(&self, plan: &Plan) -> usize {
+        let (height, width) = plan.outputs[self.maps[0]].size;
+        height * width * self.anchors.len()
+    }
+
     /// Appends every box whose score exceeds `threshold`, px of the network input, to `out`.
     pub(crate) fn candidates(&self, plan: &Plan, threshold: f32, out: &mut Vec<Detection>) {
         let [boxes, objects, classes] = self.maps.map(|index| &plan.outputs[index]);

@@ -25,7 +25,8 @@ pub enum ModelError {
     #[error(
         "{model}: node \"{node}\" ({op}): {what}; this runtime computes the YOLO-FastestV2 architecture only: \
          convolutions 1×1, depthwise and one 3×3 stem, ReLU, batch norm, max pool 3/2/1, concat, channel shuffle and \
-         nearest ×2 upsampling, exported to ONNX with fixed sizes, in float32, with six raw outputs"
+         nearest ×2 upsampling, exported to ONNX with fixed sizes, with six raw outputs; other YOLO networks need a build with the \
+         feature rten"
     )]
     Unsupported {
         /// Name of the model.

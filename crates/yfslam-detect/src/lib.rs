@@ -12,18 +12,24 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let image = yfslam::image::RgbImage::new(640, 480);
-//! let mut detector = YoloFastestV2::load("model.onnx".as_ref(), &DetectorConfig::default())?;
+//! let mut detector = YoloFastestV2::load("model.onnx".as_ref(), &DetectorConfig::default())?; // or YoloFastestV2::embedded
 //! let mut found = Vec::new();
 //! detector.detect(&image, &mut found)?;
 //! # Ok(()) }
 //! ```
+//!
+//! With the feature `rten`, `AnyYolo` runs YOLO networks of other architectures, slower and on all cores; [`load()`] takes whatever there is.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "rten")]
+mod any_yolo;
 mod config;
 mod decode;
+mod embedded;
 mod error;
 mod graph;
 mod kernels;
+mod load;
 mod memory;
 mod onnx;
 mod places;
@@ -31,8 +37,12 @@ mod plan;
 mod preprocess;
 mod yolo;
 
+#[cfg(feature = "rten")]
+pub use any_yolo::AnyYolo;
 pub use config::DetectorConfig;
+pub use embedded::EMBEDDED_MODEL;
 pub use error::ModelError;
 pub use fearless_simd::Level;
 pub use kernels::available_levels;
+pub use load::load;
 pub use yolo::{RawOutput, YoloFastestV2};

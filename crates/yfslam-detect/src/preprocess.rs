@@ -76,8 +76,12 @@ mod tests {
     use super::*;
 
     fn stretch(image: &RgbImage, size: (usize, usize)) -> [Vec<f32>; 3] {
+        stretch_at(Level::new(), image, size)
+    }
+
+    fn stretch_at(level: Level, image: &RgbImage, size: (usize, usize)) -> [Vec<f32>; 3] {
         let mut planes = [0; 3].map(|_| vec![0.0; size.0 * size.1]);
-        Stretch::default().run(Level::new(), image, size, planes.each_mut().map(|plane| &mut plane[..]));
+        Stretch::default().run(level, image, size, planes.each_mut().map(|plane| &mut plane[..]));
         planes
     }
 
@@ -148,6 +152,16 @@ mod tests {
                     planes[index]
                 );
             }
+        }
+    }
+
+    #[test]
+    fn every_level_gives_the_same_bits() {
+        for (width, height) in [(640, 480), (352, 352), (1, 7), (333, 250)] {
+            let pixel = |index: usize| [index * 7, index / 3, index / width].map(|value| value as u8);
+            let image = RgbImage::from_vec(width, height, (0..width * height).map(pixel).collect()).unwrap();
+            let expected = stretch_at(Level::fallback(), &image, (64, 35));
+            assert!(crate::available_levels().into_iter().all(|level| stretch_at(level, &image, (64, 35)) == expected));
         }
     }
 

@@ -13,8 +13,8 @@ use crate::plan::Plan;
 use crate::preprocess::Stretch;
 use crate::{ModelError, graph};
 
-/// The detector network, loaded and ready. It runs on the calling thread and allocates nothing per image once the first one of
-/// a size has passed.
+/// The detector network, loaded and ready. It runs on the calling thread and, once the first image of a size has passed, allocates
+/// nothing but what the caller's list needs to grow.
 #[derive(Debug)]
 pub struct YoloFastestV2 {
     plan: Plan,
@@ -66,19 +66,10 @@ impl YoloFastestV2 {
         }
         let plan = Plan::new(name, graph::lower(name, &model)?, Level::new())?;
         let (grids, classes) = Grid::find(name, &plan, &config.anchors)?;
-        let class_names = match model.metadata.get("names") {
-            _ if !config.class_names.is_empty() => config.class_names.clone(),
-            Some(text) => parse_names(text),
-            None if classes == COCO_NAMES.len() => COCO_NAMES.map(String::from).into(),
-            None => return Err(mismatch(format!("the model has {classes} classes without names; set `class_names`"))),
-        };
-        if class_names.len() != classes {
-            return Err(mismatch(format!(
-                "the model has {classes} classes, but {} names are given",
-                class_names.len()
-            )));
-        }
-        Ok(Self { plan, grids, config, class_names, stretch: Stretch::default(), candidates: Vec::new() })
+        let class_names = class_names(&model, &config, classes).map_err(mismatch)?;
+        // Room for a box of every anchor in every cell.
+        let candidates = Vec::with_capacity(grids.iter().map(|grid| grid.most_candidates(&plan)).sum());
+        Ok(Self { plan, grids, config, class_names, stretch: Stretch::default(), candidates })
     }
 
     /// Uses the instruction set `level` instead of the best one, to compare and to test.
@@ -151,7 +142,23 @@ impl Detector for YoloFastestV2 {
     }
 }
 
-fn check(config: &DetectorConfig) -> Result<(), String> {
+/// The names of a model's classes: those configured, else its own, else those of COCO.
+pub(crate) fn class_names(model: &Model, config: &DetectorConfig, classes: usize) -> Result<Vec<String>, String> {
+    let names = match model.metadata.get("names") {
+        _ if !config.class_names.is_empty() => config.class_names.clone(),
+        Some(text) => parse_names(text),
+        None if classes == COCO_NAMES.len() => COCO_NAMES.map(String::from).into(),
+        None => return Err(format!("the model has {classes} classes without names; set `class_names`")),
+    };
+    if names.len() == classes {
+        Ok(names)
+    } else {
+        Err(format!("the model has {classes} classes, but {} names are given", names.len()))
+    }
+}
+
+/// Refuses values with which no network can be run.
+pub(crate) fn check(config: &DetectorConfig) -> Result<(), String> {
     let DetectorConfig { score_threshold, iou_threshold, anchors, .. } = config;
     if !(*score_threshold > 0.0 && *score_threshold < 1.0) {
         return Err(format!("score_threshold = {score_threshold} must lie between 0 and 1"));
@@ -167,7 +174,7 @@ fn check(config: &DetectorConfig) -> Result<(), String> {
 }
 
 /// Class names in a model's metadata: `{0: 'person', 1: 'chair'}`, `["person", "chair"]` or `person, chair`.
-fn parse_names(text: &str) -> Vec<String> {
+pub(crate) fn parse_names(text: &str) -> Vec<String> {
     let inner = text.trim().trim_matches(['{', '}', '[', ']']);
     let name = |entry: &str| {
         let name = entry.split_once(':').map_or(entry, |(_, name)| name);

@@ -17,6 +17,9 @@ use crate::output::FAILURE_FILE;
 pub use cell::{Cell, Group};
 pub use table::{csv, markdown};
 
+/// What a method leaves in its folder when it has ended, well or not.
+const RESULTS: [&str; 2] = ["run.json", FAILURE_FILE];
+
 /// Runs cells and remembers them.
 pub struct Bench {
     /// Where cells and their runs go.
@@ -61,16 +64,20 @@ impl Bench {
         let known: Vec<Option<Cell>> = group.methods.iter().map(|method| self.known(group, method)).collect();
         let missing: Vec<&str> =
             group.methods.iter().zip(&known).filter(|(_, known)| known.is_none()).map(|(m, _)| m.as_str()).collect();
-        let failure = if missing.is_empty() { None } else { self.run(group, &missing)? };
-        let cell = |(method, known): (&String, Option<Cell>)| match known {
-            Some(cell) => Ok(cell),
-            None => {
-                let arguments = group.arguments(&[method], &self.extra);
-                let (folder, crc32) = (self.folder_of(group).join(method), self.program_crc32.clone());
-                let cell = Cell::of_run(group, method, &folder, failure.as_deref(), arguments, crc32);
-                cell.write(&self.path_of(group, method))?;
-                Ok(cell)
+        let together = if missing.is_empty() { None } else { self.run(group, &missing)? };
+        let cell = |(method, known): (&String, Option<Cell>)| {
+            if let Some(cell) = known {
+                return Ok(cell);
             }
+            let folder = self.folder_of(group).join(method);
+            let left_nothing = RESULTS.iter().all(|name| !folder.join(name).exists());
+            // A method that crashed may have taken others along.
+            let failure =
+                if left_nothing && missing.len() > 1 { self.run(group, &[method])? } else { together.clone() };
+            let arguments = group.arguments(&[method], &self.extra);
+            let cell = Cell::of_run(group, method, &folder, failure.as_deref(), arguments, self.program_crc32.clone());
+            cell.write(&self.path_of(group, method))?;
+            Ok(cell)
         };
         group.methods.iter().zip(known).map(cell).collect()
     }
@@ -88,7 +95,7 @@ impl Bench {
         let folder = self.folder_of(group);
         for method in methods {
             // What an earlier program left must not pass for the result of this one.
-            for name in ["run.json", FAILURE_FILE] {
+            for name in RESULTS {
                 let _ = std::fs::remove_file(folder.join(method).join(name));
             }
         }
@@ -111,5 +118,41 @@ impl Bench {
 
     fn path_of(&self, group: &Group, method: &str) -> PathBuf {
         self.folder.join("cells").join(format!("{}-{method}.json", group.key()))
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::os::unix::fs::PermissionsExt;
+
+    use super::*;
+
+    /// A program that crashes with the method `boxes`, and so with several.
+    const CRASHES: &str = "#!/bin/sh
+case \"$4\" in *boxes*) echo boom >&2; exit 101;; esac
+for out in \"$@\"; do :; done
+mkdir -p \"$out\"
+echo '{\"evaluation\":{\"ate\":{\"translation_m\":{\"rmse\":0.5}}}}' > \"$out/run.json\"
+";
+
+    #[test]
+    fn a_method_that_crashes_does_not_take_the_others_along() {
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("program");
+        std::fs::write(&program, CRASHES).unwrap();
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let bench =
+            Bench { folder: folder.path().into(), program, program_crc32: String::new(), jobs: 1, extra: Vec::new() };
+        let group = Group {
+            sequence: "world".into(),
+            source: "synth:world".into(),
+            methods: ["none", "boxes", "yf"].map(str::to_owned).into(),
+            seed: 1,
+            options: Vec::new(),
+            detector: Vec::new(),
+        };
+        let cells = bench.cells(&[group], |_| {}).unwrap();
+        let figures: Vec<_> = cells.iter().map(|cell| (cell.ate_rmse_m, cell.failure.as_deref())).collect();
+        assert_eq!(figures, [(Some(0.5), None), (None, Some("boom")), (Some(0.5), None)]);
     }
 }

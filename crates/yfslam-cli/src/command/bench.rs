@@ -44,8 +44,9 @@ pub struct BenchArgs {
     /// Number of frames of each sequence [default: all].
     #[arg(long, value_name = "N")]
     frames: Option<u32>,
-    /// Network that finds people, for methods `boxes` and `yf` [default: synthetic worlds and boxes.json tell].
-    #[arg(long, value_name = "FILE.onnx")]
+    /// Network that finds people, for methods `boxes` and `yf`: `embedded` or a file [default: synthetic worlds and boxes.json tell, else
+    /// embedded].
+    #[arg(long, value_name = "FILE.onnx|embedded")]
     detector: Option<PathBuf>,
     /// Processes at a time; each uses about as many cores as there are methods.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=256))]

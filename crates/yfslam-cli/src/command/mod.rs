@@ -4,6 +4,7 @@ pub mod bench;
 pub mod completions;
 pub mod config;
 pub mod demo;
+pub mod detect;
 pub mod eval;
 pub mod info;
 pub mod run;
@@ -24,6 +25,7 @@ pub fn run(cli: &Cli) -> Result<()> {
         Command::Run(args) => run::run(args, terminal),
         Command::Eval(args) => eval::run(args, terminal),
         Command::Demo(args) => demo::run(args, terminal),
+        Command::Detect(args) => detect::run(args, terminal),
         Command::Bench(args) => bench::run(args, terminal),
         Command::Synth(args) => synth::run(args, terminal),
         Command::Info(args) => info::run(args),

@@ -26,7 +26,7 @@ use crate::terminal::{Terminal, explain};
 
 const EXAMPLES: &str = "\
 Examples:
-  yfslam run rgbd_bonn_crowd --camera bonn --detector yolo-fastestv2.onnx
+  yfslam run rgbd_bonn_crowd --camera bonn
   yfslam run rgbd_dataset_freiburg1_xyz --camera tum1 --method none
   yfslam run 'synth:walking_xyz?seed=7&frames=300' --out walk      no data needed
   yfslam run synth:walking_rpy --method none,boxes,yf --report     side by side

@@ -78,19 +78,16 @@ pub struct Size {
 }
 
 impl Net {
+    /// A network without nodes; its input is called `image`.
+    pub fn empty(height: usize, width: usize) -> Self {
+        let (nodes, constants, outputs, metadata) = Default::default();
+        Net { height, width, nodes, constants, outputs, metadata, style: Style::Folded, random: 0 }
+    }
+
     /// The whole architecture.
     pub fn yolo(size: &Size, style: Style, seed: u64) -> Self {
         let &Size { height, width, channels, classes } = size;
-        let mut net = Net {
-            height,
-            width,
-            nodes: Vec::new(),
-            constants: BTreeMap::new(),
-            outputs: Vec::new(),
-            metadata: Vec::new(),
-            style,
-            random: seed,
-        };
+        let mut net = Net { style, random: seed, ..Net::empty(height, width) };
         let stem = net.conv("image", (3, channels), 3, 2, 1);
         let stem = net.relu(&stem);
         let mut x = net.node(
@@ -145,7 +142,8 @@ impl Net {
             let kept = |value: f32| (6.2e-5..6.5e4).contains(&value.abs());
             let cut = |value: f32| if kept(value) { value.to_bits() & !0x1fff } else { 0 };
             let half = |bits: u32| {
-                if bits == 0 { 0 } else { (bits >> 16 & 0x8000 | (bits & 0x7fff_ffff) - (112 << 23) >> 13) as u16 }
+                let magnitude = (bits & 0x7fff_ffff).saturating_sub(112 << 23) >> 13;
+                (bits >> 16 & 0x8000 | magnitude) as u16
             };
             stored.insert(name.clone(), (dims.clone(), values.iter().map(|value| half(cut(*value))).collect()));
             values.iter_mut().for_each(|value| *value = f32::from_bits(cut(*value)));

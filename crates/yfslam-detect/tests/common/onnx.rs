@@ -83,6 +83,7 @@ impl Net {
             self.outputs.iter().for_each(|(name, dims)| message(12, graph, |out| value_info(name, dims, out)));
             self.constants.iter().for_each(|(name, value)| message(5, graph, |out| constant(name, value, out)));
         });
+        message(8, &mut out, |opset| int(2, 13, opset));
         for (key, value) in &self.metadata {
             message(14, &mut out, |entry| {
                 bytes(1, key.as_bytes(), entry);

@@ -1,0 +1,141 @@
+//! `yfslam detect`: boxes of images as JSON and as pictures, and words for what cannot be read.
+#![allow(clippy::unwrap_used, reason = "a test may")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{fails, real_data, succeeds, yfslam};
+use serde_json::Value;
+use yfslam::image::RgbImage;
+use yfslam_io::decode::decode_color;
+use yfslam_io::write::write_color_png;
+
+/// Eight pictures of people in an office: `rec/rgb`.
+fn render(root: &Path) {
+    succeeds(root, &["synth", "walking_static?people=3&share=0.5&frames=8", "--out", "rec", "-q"]);
+}
+
+fn boxes(out: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(out.join("boxes.json")).unwrap()).unwrap()
+}
+
+fn pixels(path: &Path) -> RgbImage {
+    let mut image = RgbImage::default();
+    decode_color(&fs::read(path).unwrap(), None, &mut image).unwrap();
+    image
+}
+
+#[test]
+fn a_folder_gives_a_line_for_each_image_and_a_picture_with_its_boxes_the_same_on_every_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    render(root);
+    fs::create_dir_all(root.join("a/pictures")).unwrap();
+    fs::write(root.join("a/pictures/000007-old.png"), "").unwrap();
+    fs::write(root.join("a/pictures/mine.png"), "").unwrap();
+    let output = succeeds(root, &["detect", "rec/rgb", "--pictures", "--out", "a"]);
+    succeeds(root, &["detect", "rec/rgb", "--pictures", "--out", "b", "-q"]);
+    assert_eq!(fs::read(root.join("a/boxes.json")).unwrap(), fs::read(root.join("b/boxes.json")).unwrap());
+    let list = boxes(&root.join("a"));
+    assert_eq!((&list["model"]["file"], &list["classes"]), (&"embedded".into(), &Value::from(vec!["person"])));
+    let images = list["images"].as_array().unwrap();
+    assert_eq!(images.len(), 8);
+    let mut found = 0;
+    for (index, image) in images.iter().enumerate() {
+        let file = image["file"].as_str().unwrap();
+        let stem = Path::new(file).file_stem().unwrap().to_str().unwrap();
+        let drawn = pixels(&root.join(format!("a/pictures/{index:06}-{stem}.png")));
+        let plain = pixels(&root.join(file));
+        assert_eq!((image["width"].as_u64(), image["height"].as_u64()), (Some(640), Some(480)));
+        let boxes = image["boxes"].as_array().unwrap();
+        assert_eq!(drawn != plain, !boxes.is_empty(), "{file}");
+        for found in boxes {
+            let edges: Vec<f64> = found["bbox"].as_array().unwrap().iter().map(|edge| edge.as_f64().unwrap()).collect();
+            assert!(edges[0] < edges[2] && edges[1] < edges[3] && edges[2] <= 640.0 && edges[3] <= 480.0, "{found}");
+            assert!(found["score"].as_f64().unwrap() > 0.3 && found["class"] == "person");
+        }
+        assert!(output.stdout.contains(file));
+        found += boxes.len();
+    }
+    assert!(found > 0 && output.stdout.contains(&format!("{found} × person found in 8 images")), "{}", output.stdout);
+    let mut left: Vec<_> = fs::read_dir(root.join("a/pictures")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    left.sort();
+    assert_eq!(left.len(), 9, "{left:?}");
+    assert!(left.contains(&"mine.png".into()) && !left.contains(&"000007-old.png".into()));
+}
+
+#[test]
+fn a_higher_threshold_keeps_the_best_boxes_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    render(folder.path());
+    let scores = |score: &str| -> Vec<f64> {
+        succeeds(folder.path(), &["detect", "rec/rgb", "--score", score, "--out", score, "-q"]);
+        let list = boxes(&folder.path().join(score));
+        let found = list["images"].as_array().unwrap().iter().flat_map(|image| image["boxes"].as_array().unwrap());
+        found.map(|found| found["score"].as_f64().unwrap()).collect()
+    };
+    let (many, few) = (scores("0.1"), scores("0.5"));
+    assert!(many.len() > few.len(), "{many:?}");
+    assert_eq!(few, many.into_iter().filter(|score| *score > 0.5).collect::<Vec<_>>());
+}
+
+#[test]
+fn an_image_that_cannot_be_read_is_named_and_the_others_are_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    write_color_png(&root.join("images/good.png"), &RgbImage::new(40, 30)).unwrap();
+    let bytes = fs::read(root.join("images/good.png")).unwrap();
+    fs::write(root.join("images/cut.png"), &bytes[..bytes.len() / 2]).unwrap();
+    fs::write(root.join("images/notes.txt"), "not looked at").unwrap();
+    fs::write(root.join("photo.jpg"), "RIFF....WEBP").unwrap();
+    let output = yfslam(root, &["detect", "images", "photo.jpg", "--out", "out"]);
+    assert!(!output.success);
+    for words in ["images/cut.png is damaged", "photo.jpg is a WebP image", "2 of 3 images could not be read"] {
+        assert!(output.stderr.contains(words), "no '{words}' in {}", output.stderr);
+    }
+    let images = boxes(&root.join("out"))["images"].clone();
+    assert!(images[0]["error"].as_str().unwrap().contains("damaged") && images[0].get("boxes").is_none());
+    assert_eq!(images[1]["boxes"], Value::Array(Vec::new()));
+}
+
+#[test]
+fn what_cannot_be_done_is_said_before_the_first_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    fs::create_dir_all(root.join("seq/rgb")).unwrap();
+    fs::create_dir(root.join("empty")).unwrap();
+    write_color_png(&root.join("a.png"), &RgbImage::new(40, 30)).unwrap();
+    fails(root, &["detect", "a.png", "nowhere.png"], &["there is no nowhere.png", "check the path"]);
+    fails(root, &["detect", "empty"], &["empty holds no images", ".png, .jpg or .jpeg"]);
+    fails(root, &["detect", "seq"], &["did you mean seq/rgb?"]);
+    fails(root, &["detect", "a.png", "--class", "unicorn"], &["'unicorn'", "it knows: person"]);
+    fails(root, &["detect", "a.png", "--score", "1.5"], &["score_threshold = 1.5", "between 0 and 1"]);
+    fails(root, &["detect", "a.png", "--score", "-1"], &["score_threshold = -1"]);
+    fails(root, &["detect", "a.png", "--detector", "nowhere.onnx"], &["nowhere.onnx", "check the path"]);
+    fails(root, &["detect"], &["IMAGE|FOLDER"]);
+    assert!(!root.join("yfslam-out/detect/boxes.json").exists());
+}
+
+#[test]
+fn classes_of_another_network_are_told_apart() {
+    let (Some(model), Some(sequence)) =
+        (real_data("models/yolo-fastestv2-coco.onnx"), real_data("rgbd/tum_fr1_xyz_dev/rgb"))
+    else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (model, sequence) = (model.to_str().unwrap(), sequence.to_str().unwrap());
+    let run = |classes: &str, out: &str| -> Vec<String> {
+        let args = ["detect", sequence, "--detector", model, "--class", classes, "--out", out, "-q"];
+        succeeds(folder.path(), &args);
+        let list = boxes(&folder.path().join(out));
+        let found = list["images"].as_array().unwrap().iter().flat_map(|image| image["boxes"].as_array().unwrap());
+        found.map(|found| found["class"].as_str().unwrap().to_owned()).collect()
+    };
+    let (both, screens) = (run("tv,keyboard", "both"), run("tv", "tv"));
+    assert!(both.iter().any(|class| class == "keyboard"));
+    assert!(!screens.is_empty() && screens.iter().all(|class| class == "tv"));
+    assert_eq!(both.iter().filter(|class| *class == "tv").count(), screens.len());
+}

@@ -1,0 +1,127 @@
+//! YOLO networks of other architectures: an ONNX file for `rten` and an image in, boxes out.
+//!
+//! Red, green, blue in [0, 1], the image made to fit with grey margins; boxes in one of three [`Layout`]s. Masks of a network that
+//! segments are not read: the core knows boxes.
+
+mod layout;
+mod letterbox;
+
+use fearless_simd::Level;
+use rten::{Model as Runtime, Value, ValueOrView};
+use rten_tensor::Layout as _;
+use rten_tensor::prelude::*;
+use rten_tensor::{NdTensorView, TensorView};
+use yfslam::image::RgbImage;
+use yfslam::{Detection, Detector, DetectorError};
+
+use crate::decode::suppress;
+use crate::onnx::Model;
+use crate::yolo::{check, class_names, parse_names};
+use crate::{DetectorConfig, ModelError};
+use layout::Layout;
+use letterbox::Letterbox;
+
+/// Sides of an input that a network may have, px.
+const SIDES: std::ops::RangeInclusive<usize> = 32..=4096;
+
+/// A YOLO network of any architecture that `rten` can run, on all cores: versions 5 to 12 and 26 as their training code exports them to
+/// ONNX, with a fixed size of the input and floats of 32 bits. It allocates while it runs.
+///
+/// ```no_run
+/// use yfslam::Detector;
+/// use yfslam_detect::{AnyYolo, DetectorConfig};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let image = yfslam::image::RgbImage::new(640, 480);
+/// let mut detector = AnyYolo::from_bytes("yolo.onnx", &std::fs::read("yolo.onnx")?, &DetectorConfig::default())?;
+/// let mut found = Vec::new();
+/// detector.detect(&image, &mut found)?;
+/// # Ok(()) }
+/// ```
+pub struct AnyYolo {
+    runtime: Runtime,
+    layout: Layout,
+    letterbox: Letterbox,
+    config: DetectorConfig,
+    class_names: Vec<String>,
+    candidates: Vec<Detection>,
+}
+
+impl AnyYolo {
+    /// Reads the contents of an ONNX file, and tries the network once; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// If it is no ONNX model, `rten` cannot run it, its input or output is not as expected, or it does not fit `config`.
+    pub fn from_bytes(name: &str, bytes: &[u8], config: &DetectorConfig) -> Result<Self, ModelError> {
+        let mismatch = |what: String| ModelError::Mismatch { model: name.into(), what };
+        check(config).map_err(mismatch)?;
+        let model = Model::parse(bytes).map_err(|error| ModelError::NotOnnx { model: name.into(), what: error.0 })?;
+        let (height, width) = input_size(&model).map_err(mismatch)?;
+        let runtime =
+            Runtime::load(bytes.to_vec()).map_err(|error| mismatch(format!("rten cannot load it: {error}")))?;
+        let letterbox = Letterbox::new(height, width);
+        let outputs = run(&runtime, &letterbox).map_err(|what| mismatch(format!("rten cannot run it: {what}")))?;
+        let shapes: Vec<Vec<usize>> = outputs.iter().map(|output| output.shape().to_vec()).collect();
+        let layout = Layout::find(&shapes).map_err(mismatch)?;
+        // Where classes are numbers in the output, names alone tell how many there are.
+        let classes = layout.classes().unwrap_or_else(|| match config.class_names.len() {
+            0 => model.metadata.get("names").map_or(0, |text| parse_names(text).len()),
+            given => given,
+        });
+        let class_names = class_names(&model, config, classes).map_err(mismatch)?;
+        Ok(Self { runtime, layout, letterbox, config: config.clone(), class_names, candidates: Vec::new() })
+    }
+}
+
+impl Detector for AnyYolo {
+    fn class_names(&self) -> &[String] {
+        &self.class_names
+    }
+
+    fn detect(&mut self, image: &RgbImage, out: &mut Vec<Detection>) -> Result<(), DetectorError> {
+        out.clear();
+        let sides = [image.width(), image.height()];
+        if sides.contains(&0) {
+            return Err(DetectorError(format!("the image is empty ({} × {} px)", sides[0], sides[1])));
+        }
+        self.letterbox.put(Level::new(), image);
+        let outputs = run(&self.runtime, &self.letterbox).map_err(DetectorError)?;
+        let output: TensorView<f32> = match outputs.first().map(TryInto::try_into) {
+            Some(Ok(output)) => output,
+            _ => return Err(DetectorError("the network's first output holds no floats".into())),
+        };
+        let (shape, values) = (output.shape().to_vec(), output.to_vec());
+        self.candidates.clear();
+        self.layout.candidates(&shape, &values, self.config.score_threshold, &mut self.candidates);
+        // What suppression leaves of boxes that were suppressed already is all of them.
+        let iou_threshold = if self.layout == Layout::Final { 1.0 } else { self.config.iou_threshold };
+        suppress(&mut self.candidates, &DetectorConfig { iou_threshold, ..DetectorConfig::default() }, out);
+        out.iter_mut().for_each(|found| found.bbox = self.letterbox.to_image(found.bbox, sides));
+        out.retain(|found| found.class < self.class_names.len() && found.bbox.area() > 0.0);
+        Ok(())
+    }
+}
+
+/// Height and width of the only input.
+fn input_size(model: &Model) -> Result<(usize, usize), String> {
+    let inputs: Vec<_> = model.inputs.iter().filter(|info| !model.initializers.contains_key(info.name)).collect();
+    match inputs.as_slice() {
+        [input] => match input.dims.as_slice() {
+            [None | Some(1), Some(3), Some(height), Some(width)] if SIDES.contains(height) && SIDES.contains(width) => {
+                Ok((*height, *width))
+            }
+            dims => {
+                Err(format!("the input has the shape {dims:?}; [1, 3, height, width] with fixed numbers is expected"))
+            }
+        },
+        inputs => Err(format!("the graph has {} inputs; one image is expected", inputs.len())),
+    }
+}
+
+/// The outputs for the image that was put into `letterbox` last.
+fn run(runtime: &Runtime, letterbox: &Letterbox) -> Result<Vec<Value>, String> {
+    let (height, width) = letterbox.size;
+    let view = NdTensorView::from_data([1, 3, height, width], &letterbox.input[..]);
+    let inputs = runtime.input_ids().iter().map(|id| (*id, ValueOrView::from(view))).collect();
+    runtime.run(inputs, runtime.output_ids(), None).map_err(|error| error.to_string())
+}

@@ -1,0 +1,128 @@
+//! YOLO networks of other architectures, made on the spot: what they see is red, green and blue, each a class whose score is the share of
+//! that colour in the input; where they see it is fixed.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
+
+mod common;
+
+use common::{Attribute, Constant, Net};
+use yfslam::image::RgbImage;
+use yfslam::{BoundingBox, Detection, Detector};
+use yfslam_detect::{AnyYolo, DetectorConfig, load};
+
+/// Boxes of the networks, far more than values for each, as is usual.
+const BOXES: usize = 12;
+
+/// A network whose boxes lie 10 px apart, at the left of an input of 160 × 96 px.
+fn net(layout: &str) -> Net {
+    let mut net = Net::empty(96, 160);
+    net.metadata = vec![("names", "{0: 'red', 1: 'green', 2: 'blue'}".into())];
+    let number = |values: &[usize], data| Constant::Floats(values.to_vec(), data);
+    // Centre and size, by column.
+    let boxes: [fn(usize) -> f32; 4] = [|n| 10.0 * n as f32 + 20.0, |_| 40.0, |_| 8.0, |_| 16.0];
+    let boxes = boxes.iter().flat_map(|value| (0..BOXES).map(value)).collect();
+    net.constants.insert("boxes".into(), number(&[1, 4, BOXES], boxes));
+    net.constants.insert("ones".into(), number(&[1, 3, BOXES], vec![1.0; 3 * BOXES]));
+    net.constants.insert("half".into(), number(&[1, 1, BOXES], vec![0.5; BOXES]));
+    net.constants.insert("flat".into(), Constant::Ints(vec![3], vec![1, 3, 1]));
+    let mean = net.node("GlobalAveragePool", &["image"], "mean", vec![]);
+    let mean = net.node("Reshape", &[&mean, "flat"], "colours", vec![]);
+    let scores = net.node("Mul", &["ones", &mean], "scores", vec![]);
+    let axis = |axis| vec![("axis", Attribute::Int(axis))];
+    let parts: &[&str] = match layout {
+        "columns" => &["boxes", &scores],
+        _ => &["boxes", "half", &scores],
+    };
+    let columns = net.node("Concat", parts, "output", axis(1));
+    let turned = vec![("perm", Attribute::Ints(vec![0, 2, 1]))];
+    let (output, shape) = match layout {
+        "columns" => (columns, vec![1, 7, BOXES]),
+        "rows" => (net.node("Transpose", &[&columns], "rows", turned), vec![1, BOXES, 8]),
+        // Left, top, right, bottom, score, class; the score of the second box falls with the image's red.
+        _ => {
+            let fixed =
+                [[4.0, 10.0, 14.0, 30.0, 0.9, 2.0], [5.0, 10.0, 15.0, 30.0, 0.4, 2.0], [0.0, 0.0, 9.0, 9.0, 0.8, 7.0]];
+            net.constants.insert("fixed".into(), number(&[1, 3, 6], fixed.concat()));
+            net.constants.insert("none".into(), number(&[1, 3, 1], vec![0.0; 3]));
+            let nothing = net.node("Mul", &["none", &mean], "nothing", vec![]);
+            (net.node("Add", &["fixed", &nothing], "final", vec![]), vec![1, 3, 6])
+        }
+    };
+    net.outputs = vec![(output, shape)];
+    net
+}
+
+fn image(width: usize, height: usize, color: [u8; 3]) -> RgbImage {
+    RgbImage::from_vec(width, height, vec![color; width * height]).unwrap()
+}
+
+fn find(net: &Net, image: &RgbImage) -> Vec<Detection> {
+    let mut detector = AnyYolo::from_bytes("test.onnx", &net.to_onnx(), &DetectorConfig::default()).unwrap();
+    assert_eq!(detector.class_names(), ["red", "green", "blue"]);
+    let mut found = vec![Detection { class: 9, score: 1.0, bbox: BoundingBox::default() }];
+    detector.detect(image, &mut found).unwrap();
+    found
+}
+
+fn assert_near(bbox: BoundingBox, expected: [f32; 4]) {
+    let found = [bbox.x_min, bbox.y_min, bbox.x_max, bbox.y_max];
+    assert!(
+        found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-3),
+        "{found:?} {expected:?}"
+    );
+}
+
+#[test]
+fn boxes_in_columns_and_in_rows_are_those_of_the_image_with_class_and_score() {
+    for (layout, factor) in [("columns", 1.0), ("rows", 0.5)] {
+        // Twice the size of the input, of the same shape: no margins.
+        let found = find(&net(layout), &image(320, 192, [0, 204, 51]));
+        assert_eq!(found.len(), BOXES, "{layout}");
+        assert!(found.iter().all(|found| found.class == 1 && (found.score - 0.8 * factor).abs() < 1e-3), "{found:?}");
+        assert_near(found[0].bbox, [32.0, 64.0, 48.0, 96.0]);
+        assert_near(found[3].bbox, [92.0, 64.0, 108.0, 96.0]);
+        // Red first, whatever the order in which others take colours.
+        assert_eq!(find(&net(layout), &image(320, 192, [255, 0, 0]))[0].class, 0);
+    }
+}
+
+#[test]
+fn boxes_beside_the_image_are_left_out() {
+    // A square in an input of 160 × 96 px lies between columns 32 and 128.
+    let found = find(&net("columns"), &image(96, 96, [0, 255, 0]));
+    assert_eq!(found.len(), BOXES - 1);
+    // The second begins and the last ends beside it.
+    assert_near(found[0].bbox, [0.0, 32.0, 2.0, 48.0]);
+    assert_near(found[10].bbox, [94.0, 32.0, 96.0, 48.0]);
+}
+
+#[test]
+fn boxes_that_were_suppressed_already_are_all_kept_but_for_unknown_classes_and_low_scores() {
+    let found = find(&net("final"), &image(160, 96, [1, 2, 3]));
+    assert_eq!(found.iter().map(|found| (found.class, found.score)).collect::<Vec<_>>(), [(2, 0.9), (2, 0.4)]);
+    assert_near(found[0].bbox, [4.0, 10.0, 14.0, 30.0]);
+}
+
+#[test]
+fn what_is_known_to_neither_runtime_is_refused_and_each_takes_its_own() {
+    let words = |net: &Net, config: &DetectorConfig| match load("test.onnx", &net.to_onnx(), config) {
+        Ok(_) => String::new(),
+        Err(error) => error.to_string(),
+    };
+    let config = DetectorConfig::default();
+    assert_eq!(words(&net("columns"), &config), "");
+    let size = common::Size { height: 64, width: 64, channels: 4, classes: 80 };
+    assert_eq!(words(&Net::yolo(&size, common::Style::Folded, 1), &config), "");
+    let mut strange = net("columns");
+    strange.outputs[0].0 = "colours1_out".into();
+    assert!(words(&strange, &config).contains("[1, 4 + classes, n]"), "{}", words(&strange, &config));
+    let mut strange = net("columns");
+    strange.nodes[0].op = "Sorcery";
+    assert!(words(&strange, &config).contains("rten cannot load it"), "{}", words(&strange, &config));
+    let mut strange = net("columns");
+    strange.metadata.clear();
+    assert!(words(&strange, &config).contains("3 classes without names"), "{}", words(&strange, &config));
+    let named = DetectorConfig { class_names: vec!["a".into()], ..config };
+    assert!(words(&net("columns"), &named).contains("3 classes, but 1 names"));
+    let error = AnyYolo::from_bytes("test.onnx", b"hello", &DetectorConfig::default()).err().unwrap();
+    assert!(error.to_string().contains("not a readable ONNX model"), "{error}");
+}
