@@ -32,6 +32,8 @@ pub enum MethodArg {
     Boxes,
     /// YF-SLAM: inside a box the depth group of the body is dropped, the background stays.
     Yf,
+    /// Outlines of bodies in depth are dropped, and whatever else has moved since earlier views.
+    Full,
 }
 
 /// How the depth group of a moving body is found.
@@ -50,6 +52,7 @@ impl MethodArg {
             Self::None => Method::None,
             Self::Boxes => Method::Boxes,
             Self::Yf => Method::Yf,
+            Self::Full => Method::Full,
         }
     }
 }
@@ -60,6 +63,7 @@ pub fn describe(method: Method) -> (&'static str, &'static str) {
         Method::None => ("none", "every feature is trusted"),
         Method::Boxes => ("boxes", "features in boxes of people are dropped"),
         Method::Yf => ("yf", "people are kept out, what is behind them stays"),
+        Method::Full => ("full", "outlines of people and of whatever has moved are kept out"),
     }
 }
 

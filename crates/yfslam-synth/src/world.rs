@@ -131,7 +131,13 @@ impl World {
         });
         SynthFrame {
             depth_timestamp_ns: to_ns(time + self.config.sensor.depth_offset_s),
-            frame: RgbdFrame { timestamp_ns: to_ns(time), color: Arc::new(color), depth: Arc::new(depth), detections },
+            frame: RgbdFrame {
+                timestamp_ns: to_ns(time),
+                color: Arc::new(color),
+                depth: Arc::new(depth),
+                detections,
+                mask: None,
+            },
             t_world_cam,
             instances: image(width, height, picture.instance),
             exact_depth: image(width, height, picture.depth),

@@ -49,6 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             color: Arc::new(color),
             depth: Arc::new(depth),
             detections: Some(nobody),
+            mask: None,
         };
         let tracked = slam.track(&frame)?;
         if let Some(pose) = tracked.t_world_cam {

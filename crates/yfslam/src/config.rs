@@ -267,9 +267,41 @@ config_section! {
 }
 
 config_section! {
+    /// Method `full`: outlines of bodies, and what has moved since earlier views.
+    FullConfig {
+        /// Difference in depth of neighbouring cells of one surface, m: this,
+        surface_step_m: f32 = 0.02,
+        /// and this share of the depth.
+        surface_step_share: f32 = 0.03,
+        /// Cells of 4 × 4 px without depth over which a body goes on.
+        max_gap_cells: u8 = 8,
+        /// Earlier frames that are kept to tell what has moved since.
+        views: usize = 8,
+        /// Time between them, s.
+        view_spacing_s: f64 = 0.5,
+        /// Distance of the camera from where it was for a view that still tells, m.
+        view_max_distance_m: f64 = 1.0,
+        /// The same for its direction, degrees.
+        view_max_angle_deg: f64 = 40.0,
+        /// Difference from the depth that a view predicts which is taken for the sensor's error, m: this,
+        view_tolerance_m: f32 = 0.05,
+        /// and this share of the depth.
+        view_tolerance_share: f32 = 0.04,
+        /// Cells of 8 × 8 px that make something that has moved.
+        view_min_cells: usize = 12,
+        /// Difference in depth up to which neighbouring cells that have moved are one thing, m.
+        view_thing_step_m: f32 = 0.66,
+        /// Distance from the body within which a corner sees its outline, px at the finest level.
+        edge_px: f32 = 3.0,
+        /// Frames over which a track is carried without a box.
+        max_misses: usize = 30,
+    }
+}
+
+config_section! {
     /// Keeping moving things out (YF-SLAM, section 3.3).
     DynamicConfig {
-        /// `none` (ORB-SLAM2), `boxes` (all features in boxes dropped) or `yf` (the paper).
+        /// `none` (ORB-SLAM2), `boxes` (all features in boxes dropped), `yf` (the paper) or `full` (ours).
         method: Method = Method::Yf,
         /// How the largest depth group is found: `ransac` (the paper, seeded) or `exact` (deterministic search).
         grouping: Grouping = Grouping::Exact,
@@ -305,6 +337,8 @@ config_section! {
         max_extra_features: f64 = 2.5,
         /// Seed of the random draws.
         seed: u64 = 0,
+        /// What only method `full` does.
+        full: FullConfig = FullConfig::default(),
     }
 }
 

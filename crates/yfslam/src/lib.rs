@@ -43,6 +43,7 @@
 //!     color: Arc::new(RgbImage::new(640, 480)),
 //!     depth: Arc::new(DepthImage { raw: Image::new(640, 480), metres_per_unit: 1.0 / 5000.0 }),
 //!     detections: None,
+//!     mask: None,
 //! };
 //! let tracked = slam.track(&frame)?;
 //! assert!(tracked.t_world_cam.is_none(), "a blank picture starts no map");

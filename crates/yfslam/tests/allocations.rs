@@ -76,6 +76,7 @@ fn tracking_allocates_nothing_between_keyframes() -> Result<(), Box<dyn Error>> 
         color: Arc::new(texture(3)),
         depth: Arc::new(DepthImage { raw, metres_per_unit: 1.0 / 5000.0 }),
         detections: Some(vec![Detection { class: 0, score: 0.9, bbox }]),
+        mask: None,
     };
     let mut quiet = 0;
     for i in 0..60 {

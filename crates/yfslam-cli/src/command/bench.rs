@@ -36,7 +36,7 @@ pub struct BenchArgs {
     sequences: Vec<String>,
     /// Methods to compare.
     #[arg(long, alias = "method", value_name = "METHOD,METHOD", value_delimiter = ',', default_value = "none,boxes,yf",
-          value_parser = ["none", "boxes", "yf"])]
+          value_parser = ["none", "boxes", "yf", "full"])]
     methods: Vec<String>,
     /// Number of seeds: of the world if it is synthetic, else of the method's random draws.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = value_parser!(u64).range(1..=1000))]

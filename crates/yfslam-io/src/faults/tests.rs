@@ -12,6 +12,7 @@ fn frame(k: i64) -> RgbdFrame {
         color: Arc::new(color),
         depth: Arc::new(DepthImage { raw, metres_per_unit: 0.0002 }),
         detections: Some(vec![Detection { class: 0, score: 1.0, bbox }]),
+        mask: None,
     }
 }
 

@@ -3,9 +3,12 @@
 //! In: boxes of movable objects, the depth image, the frame's features. Out: each feature's trust. Nothing else in the core knows that
 //! people exist.
 
+mod body_mask;
 mod boxes;
 pub mod depth_group;
+mod full;
 mod tracks;
+mod views;
 mod yf;
 
 use serde::{Deserialize, Serialize};
@@ -13,7 +16,11 @@ use serde::{Deserialize, Serialize};
 use crate::config::DynamicConfig;
 use crate::detection::{BoundingBox, Detection};
 use crate::features::FrameFeatures;
-use crate::image::DepthImage;
+use crate::geometry::Pose;
+use crate::image::{DepthImage, Image};
+use crate::map::{KeyFrameId, Map};
+use crate::sensor::SensorModel;
+use full::Full;
 use tracks::Tracks;
 
 /// How moving things are kept out.
@@ -27,6 +34,8 @@ pub enum Method {
     /// YF-SLAM: inside a box, the depth group of the body is dropped and the background stays.
     #[default]
     Yf,
+    /// Outlines of bodies in depth, and whatever has moved since earlier views.
+    Full,
 }
 
 /// A part of the image that was found to move.
@@ -42,12 +51,38 @@ pub struct Region {
     pub depth_m: Option<[f32; 2]>,
 }
 
+/// What is known of a frame before its pose.
+pub struct Evidence<'a> {
+    /// Boxes of movable objects, at any score.
+    pub movable: &'a [Detection],
+    /// Pixels of movable objects, where somebody knows them.
+    pub mask: Option<&'a Image<u8>>,
+    /// The depth image.
+    pub depth: &'a DepthImage,
+    /// Scales of the pyramid's levels.
+    pub scale_factors: &'a [f32],
+}
+
+/// A first pose, and what it can be compared with.
+pub struct Door<'a> {
+    /// The camera.
+    pub sensor: &'a SensorModel,
+    /// The map.
+    pub map: &'a Map,
+    /// The pose of the frame.
+    pub t_cam_world: &'a Pose,
+}
+
+/// A keyframe and the pose of a frame seen from there, `t_cam_reference`: it moves along when the map is corrected.
+pub type Tie = (KeyFrameId, Pose);
+
 /// Decides about the features of one frame after another.
 #[derive(Clone, Debug, Default)]
 pub struct DynamicFilter {
     tracks: Tracks,
     regions: Vec<Region>,
     groups: yf::DepthGroups,
+    full: Full,
 }
 
 impl DynamicFilter {
@@ -56,27 +91,40 @@ impl DynamicFilter {
         Self { groups: yf::DepthGroups::new(seed), ..Self::default() }
     }
 
-    /// Sets the trust of `features` from what boxes and depth tell, before the pose is known. `movable` are this frame's boxes of
-    /// movable objects at any score, `scale_factors` those of the pyramid's levels.
-    pub fn before_pose(
-        &mut self,
-        config: &DynamicConfig,
-        movable: &[Detection],
-        depth: &DepthImage,
-        features: &mut FrameFeatures,
-        scale_factors: &[f32],
-    ) {
+    /// Sets the trust of `features` from what boxes, masks and depth tell, before the pose is known.
+    pub fn before_pose(&mut self, config: &DynamicConfig, evidence: &Evidence<'_>, features: &mut FrameFeatures) {
         self.regions.clear();
+        let &Evidence { movable, depth, scale_factors, .. } = evidence;
+        let size = [depth.raw.width(), depth.raw.height()];
         match config.method {
             Method::None => return,
             Method::Boxes => self.regions.extend(boxes::regions(config, movable)),
             Method::Yf => {
                 let depths = self.groups.depths_of(config, movable, depth, features);
-                self.tracks.update(config, movable, depths, [depth.raw.width(), depth.raw.height()]);
+                self.tracks.update(config, config.max_misses, movable, depths, size);
                 self.groups.regions(config, &mut self.tracks, depth, features, &mut self.regions);
+            }
+            Method::Full => {
+                let depths = self.groups.depths_of(config, movable, depth, features);
+                self.tracks.update(config, config.full.max_misses, movable, depths, size);
+                let Self { full, groups, tracks, regions, .. } = self;
+                full.before_pose(config, groups, tracks, evidence, features, regions);
+                return;
             }
         }
         apply(config, &mut self.regions, depth, features, scale_factors);
+    }
+
+    /// Sharpens the trust of `features` when a first pose stands. Returns whether that changed.
+    pub fn after_pose(&mut self, config: &DynamicConfig, door: &Door<'_>, features: &mut FrameFeatures) -> bool {
+        config.method == Method::Full && self.full.after_pose(config, door, features)
+    }
+
+    /// Takes note of the pose of the frame.
+    pub fn end_frame(&mut self, config: &DynamicConfig, timestamp_ns: i64, tie: Option<Tie>) {
+        if let (Method::Full, Some(tie)) = (config.method, tie) {
+            self.full.keep_view(config, timestamp_ns, tie);
+        }
     }
 
     /// The parts of the last frame that were found to move.
@@ -84,10 +132,11 @@ impl DynamicFilter {
         &self.regions
     }
 
-    /// Forgets all tracks.
+    /// Forgets all tracks and views.
     pub fn reset(&mut self) {
         self.tracks = Tracks::default();
         self.regions.clear();
+        self.full.reset();
     }
 }
 

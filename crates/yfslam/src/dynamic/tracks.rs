@@ -38,6 +38,7 @@ impl Tracks {
     pub fn update(
         &mut self,
         config: &DynamicConfig,
+        max_misses: usize,
         detections: &[Detection],
         depths_m: &[Option<f32>],
         [width, height]: [usize; 2],
@@ -82,7 +83,7 @@ impl Tracks {
             }
         }
         let image = BoundingBox { x_min: 0.0, y_min: 0.0, x_max: width as f32, y_max: height as f32 };
-        self.list.retain(|t| t.misses <= config.max_misses && t.bbox.iou(&image) > 0.0);
+        self.list.retain(|t| t.misses <= max_misses && t.bbox.iou(&image) > 0.0);
     }
 }
 
@@ -121,15 +122,15 @@ mod tests {
         let config = DynamicConfig::default();
         let mut tracks = Tracks::default();
         for i in 0..10 {
-            tracks.update(&config, &[detection(50.0 + 8.0 * i as f32, 0.8)], &[None], [640, 480]);
+            tracks.update(&config, 10, &[detection(50.0 + 8.0 * i as f32, 0.8)], &[None], [640, 480]);
         }
         for _ in 0..5 {
-            tracks.update(&config, &[], &[], [640, 480]);
+            tracks.update(&config, 10, &[], &[], [640, 480]);
         }
         assert_eq!((tracks.list.len(), tracks.list[0].misses), (1, 5));
         assert!((tracks.list[0].bbox.x_min - 162.0).abs() < 4.0, "{:?}", tracks.list[0]);
-        for _ in 0..config.max_misses {
-            tracks.update(&config, &[], &[], [640, 480]);
+        for _ in 0..10 {
+            tracks.update(&config, 10, &[], &[], [640, 480]);
         }
         assert!(tracks.list.is_empty());
     }
@@ -138,9 +139,9 @@ mod tests {
     fn somebody_who_passes_in_front_does_not_take_a_track_over() {
         let config = DynamicConfig::default();
         let mut tracks = Tracks::default();
-        tracks.update(&config, &[detection(50.0, 0.8)], &[Some(2.0)], [640, 480]);
+        tracks.update(&config, 10, &[detection(50.0, 0.8)], &[Some(2.0)], [640, 480]);
         tracks.list[0].depth_m = Some(2.0);
-        tracks.update(&config, &[detection(60.0, 0.8)], &[Some(1.2)], [640, 480]);
+        tracks.update(&config, 10, &[detection(60.0, 0.8)], &[Some(1.2)], [640, 480]);
         assert_eq!(tracks.list.iter().map(|t| t.misses).collect::<Vec<_>>(), [1, 0]);
     }
 
@@ -148,10 +149,10 @@ mod tests {
     fn a_faint_box_keeps_a_track_but_opens_none() {
         let config = DynamicConfig::default();
         let mut tracks = Tracks::default();
-        tracks.update(&config, &[detection(50.0, 0.15)], &[None], [640, 480]);
+        tracks.update(&config, 10, &[detection(50.0, 0.15)], &[None], [640, 480]);
         assert!(tracks.list.is_empty());
-        tracks.update(&config, &[detection(50.0, 0.5)], &[None], [640, 480]);
-        tracks.update(&config, &[detection(52.0, 0.15)], &[None], [640, 480]);
+        tracks.update(&config, 10, &[detection(50.0, 0.5)], &[None], [640, 480]);
+        tracks.update(&config, 10, &[detection(52.0, 0.15)], &[None], [640, 480]);
         assert_eq!((tracks.list.len(), tracks.list[0].misses), (1, 0));
     }
 }

@@ -10,7 +10,7 @@ use crate::camera::Camera;
 use crate::config::Config;
 use crate::detection::{Detection, Detector};
 use crate::detector_thread::DetectorThread;
-use crate::dynamic::{DynamicFilter, Method, Region};
+use crate::dynamic::{Door, DynamicFilter, Evidence, Method, Region};
 use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
@@ -205,8 +205,13 @@ impl Slam {
         self.collect_boxes(frame, detecting);
         times.detector_wait = clock.lap();
         let features = &mut self.tracker.current.features;
-        let scales = &self.sensor.scale_factors;
-        self.filter.before_pose(&self.config.dynamic, &self.movable, &frame.depth, features, scales);
+        let evidence = Evidence {
+            movable: &self.movable,
+            mask: frame.mask.as_deref(),
+            depth: &frame.depth,
+            scale_factors: &self.sensor.scale_factors,
+        };
+        self.filter.before_pose(&self.config.dynamic, &evidence, features);
         times.dynamic = clock.lap();
         let mut loop_closed = None;
         if let Some(inserted) = self.owner.poll() {
@@ -218,8 +223,11 @@ impl Slam {
             TrackingState::Tracking => {
                 let min_inliers = self.config.tracking.local_min_inliers;
                 let map = self.owner.map();
-                self.tracker.estimate(&self.sensor, &self.config, map)
-                    && self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers)
+                let estimated = self.tracker.estimate(&self.sensor, &self.config, map);
+                if estimated {
+                    sharpen(&mut self.filter, &mut self.tracker.current, &self.sensor, &self.config, map);
+                }
+                estimated && self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers)
             }
             TrackingState::Lost => {
                 let found = self.find_again();
@@ -232,6 +240,7 @@ impl Slam {
         self.owner.note(&mut self.tracker.sightings);
         if tracked {
             self.tracker.accept(self.owner.map());
+            self.filter.end_frame(&self.config.dynamic, frame.timestamp_ns, self.tracker.current.reference);
         } else {
             self.tracker.reject();
         }
@@ -460,6 +469,15 @@ impl StageTimes {
         self.mapping += inserted.mapping;
         self.places += inserted.places;
         inserted.loop_closed
+    }
+}
+
+/// Compares the frame with the map by its first pose; what turns out to move is dropped, and the pose refined without it.
+fn sharpen(filter: &mut DynamicFilter, current: &mut TrackedFrame, sensor: &SensorModel, config: &Config, map: &Map) {
+    let door = Door { sensor, map, t_cam_world: &current.t_cam_world };
+    if filter.after_pose(&config.dynamic, &door, &mut current.features) {
+        current.drop_distrusted();
+        current.refine_pose(sensor, &config.pose);
     }
 }
 

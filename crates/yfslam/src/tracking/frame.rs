@@ -49,6 +49,15 @@ impl TrackedFrame {
         self.sights[feature].is_none() && self.features.features[feature].trust > 0.0
     }
 
+    /// Forgets the matches of features that are not trusted any more.
+    pub fn drop_distrusted(&mut self) {
+        for (sight, feature) in self.sights.iter_mut().zip(&self.features.features) {
+            if feature.trust <= 0.0 {
+                *sight = None;
+            }
+        }
+    }
+
     /// Number of matched features.
     pub fn matched(&self) -> usize {
         self.sights.iter().flatten().count()

@@ -1,0 +1,235 @@
+//! The outline of bodies in the depth image: from a depth inside a box to all that hangs together with it.
+//!
+//! In: the depth image, boxes with the depth of the body in each. Out: a mask on a grid of cells. DynaSLAM (IEEE RA-L 2018, section
+//! III-C) grows regions in depth likewise, from key points.
+
+use crate::config::DynamicConfig;
+use crate::detection::BoundingBox;
+use crate::image::{DepthImage, Image};
+
+/// Side of a cell, px.
+pub const CELL_PX: usize = 4;
+
+/// Which cells of the image show something that moves. Buffers are reused.
+#[derive(Clone, Debug, Default)]
+pub struct BodyMask {
+    columns: usize,
+    rows: usize,
+    /// Depth in the middle of each cell, m; 0 where it is unknown.
+    depth_m: Vec<f32>,
+    moving: Vec<bool>,
+    /// Cells of the body that is being outlined.
+    body: Vec<Reached>,
+}
+
+/// A cell of a body, or of a gap in it.
+#[derive(Clone, Copy, Debug)]
+struct Reached {
+    cell: u32,
+    /// Its depth, or that of the last cell before the gap, m.
+    depth_m: f32,
+    /// Cells without depth since.
+    gap: u8,
+}
+
+impl BodyMask {
+    /// Begins a frame: samples depth, and nothing moves.
+    pub fn begin(&mut self, depth: &DepthImage) {
+        self.columns = depth.raw.width() / CELL_PX;
+        self.rows = depth.raw.height() / CELL_PX;
+        self.depth_m.clear();
+        for row in 0..self.rows {
+            let y = row * CELL_PX + CELL_PX / 2;
+            let cell = |column: usize| depth.metres(column * CELL_PX + CELL_PX / 2, y).unwrap_or(0.0);
+            self.depth_m.extend((0..self.columns).map(cell));
+        }
+        self.moving.clear();
+        self.moving.resize(self.depth_m.len(), false);
+    }
+
+    /// Appends the depths in a box that belong to no body yet, m.
+    pub fn free_depths(&self, bbox: &BoundingBox, out: &mut Vec<f32>) {
+        let [left, top, right, bottom] = self.cells(bbox, 0.0);
+        for row in top..bottom {
+            let line = row * self.columns..(row + 1) * self.columns;
+            let cells = self.depth_m[line.clone()].iter().zip(&self.moving[line]).take(right).skip(left);
+            out.extend(cells.filter(|(z, moving)| **z > 0.0 && !**moving).map(|(z, _)| *z));
+        }
+    }
+
+    /// Marks the body whose middle is `center_m` away: the cells of the box at that depth, and those in the box grown by `config.margin`
+    /// to which the surface leads on without a step, over gaps without depth too. Of the gaps, those in the box are marked.
+    pub fn grow(&mut self, config: &DynamicConfig, bbox: &BoundingBox, center_m: f32) {
+        let (inner, outer) = (self.cells(bbox, 0.0), self.cells(bbox, config.margin));
+        let [near, far] = [center_m - config.group_half_width_m, center_m + config.group_half_width_m];
+        let [nearest, farthest] = [near - config.reach_m, far + config.reach_m];
+        self.body.clear();
+        for row in inner[1]..inner[3] {
+            for column in inner[0]..inner[2] {
+                let cell = row * self.columns + column;
+                let z = self.depth_m[cell];
+                if z >= near && z <= far && !self.moving[cell] {
+                    self.moving[cell] = true;
+                    self.body.push(Reached { cell: cell as u32, depth_m: z, gap: 0 });
+                }
+            }
+        }
+        let mut next = 0;
+        while let Some(&Reached { cell, depth_m, gap }) = self.body.get(next) {
+            next += 1;
+            let cell = cell as usize;
+            let (row, column) = (cell / self.columns, cell % self.columns);
+            let step = (config.full.surface_step_m + config.full.surface_step_share * depth_m) * (1.0 + f32::from(gap));
+            for (r, c) in
+                [(row.wrapping_sub(1), column), (row + 1, column), (row, column.wrapping_sub(1)), (row, column + 1)]
+            {
+                if r < outer[1] || r >= outer[3] || c < outer[0] || c >= outer[2] {
+                    continue;
+                }
+                let cell = r * self.columns + c;
+                if self.moving[cell] {
+                    continue;
+                }
+                let z = self.depth_m[cell];
+                if z > 0.0 {
+                    if (z - depth_m).abs() <= step && z >= nearest && z <= farthest {
+                        self.moving[cell] = true;
+                        self.body.push(Reached { cell: cell as u32, depth_m: z, gap: 0 });
+                    }
+                } else if gap < config.full.max_gap_cells
+                    && r >= inner[1]
+                    && r < inner[3]
+                    && c >= inner[0]
+                    && c < inner[2]
+                {
+                    self.moving[cell] = true;
+                    self.body.push(Reached { cell: cell as u32, depth_m, gap: gap + 1 });
+                }
+            }
+        }
+    }
+
+    /// Marks the cells whose middle a mask of movable objects covers.
+    pub fn mark_mask(&mut self, mask: &Image<u8>) {
+        for (row, line) in self.moving.chunks_mut(self.columns.max(1)).enumerate() {
+            let y = row * CELL_PX + CELL_PX / 2;
+            for (column, moving) in line.iter_mut().enumerate() {
+                *moving |= mask.get(column * CELL_PX + CELL_PX / 2, y).is_some_and(|number| *number > 0);
+            }
+        }
+    }
+
+    /// Whether a box shows something that moves.
+    pub fn holds_body(&self, bbox: &BoundingBox) -> bool {
+        let [left, top, right, bottom] = self.cells(bbox, 0.0);
+        (top..bottom).any(|row| self.moving[row * self.columns..].iter().take(right).skip(left).any(|moving| *moving))
+    }
+
+    /// Marks a whole box.
+    pub fn fill(&mut self, bbox: &BoundingBox) {
+        let [left, top, right, bottom] = self.cells(bbox, 0.0);
+        for row in top..bottom {
+            self.moving[row * self.columns + left..row * self.columns + right.max(left)].fill(true);
+        }
+    }
+
+    /// Depths of every second cell of every second row, m; 0 where it is unknown or something moves.
+    pub fn coarse(&self, out: &mut Vec<f32>) {
+        out.clear();
+        for row in (0..self.rows / 2 * 2).step_by(2) {
+            let cells = (row * self.columns..row * self.columns + self.columns / 2 * 2).step_by(2);
+            out.extend(cells.map(|cell| if self.moving[cell] { 0.0 } else { self.depth_m[cell] }));
+        }
+    }
+
+    /// Marks a cell of twice the side, and what adjoins it.
+    pub fn mark_coarse(&mut self, column: usize, row: usize) {
+        for r in (2 * row).saturating_sub(1)..(2 * row + 3).min(self.rows) {
+            let line = r * self.columns;
+            self.moving[line + (2 * column).saturating_sub(1)..line + (2 * column + 3).min(self.columns)].fill(true);
+        }
+    }
+
+    /// Whether a position of the raw image, px, lies on a body or within `edge_px` of one.
+    pub fn covers(&self, [x, y]: [f32; 2], edge_px: f32) -> bool {
+        let near = |d: f32, r: f32| (((d - r).max(0.0) as usize) / CELL_PX, ((d + r).max(0.0) as usize) / CELL_PX);
+        let ((left, right), (top, bottom)) = (near(x, edge_px), near(y, edge_px));
+        (top..=bottom.min(self.rows.saturating_sub(1))).any(|row| {
+            let (from, to) =
+                (row * self.columns + left, row * self.columns + right.min(self.columns.saturating_sub(1)));
+            self.moving.get(from..=to).is_some_and(|cells| cells.contains(&true))
+        })
+    }
+
+    /// Cells of a box grown by a share of its size: left, top, right, bottom.
+    fn cells(&self, b: &BoundingBox, margin: f32) -> [usize; 4] {
+        let (dx, dy) = (margin * (b.x_max - b.x_min), margin * (b.y_max - b.y_min));
+        let cell = |v: f32, limit: usize| ((v.max(0.0) as usize) / CELL_PX).min(limit);
+        [
+            cell(b.x_min - dx, self.columns),
+            cell(b.y_min - dy, self.rows),
+            cell(b.x_max + dx + CELL_PX as f32, self.columns),
+            cell(b.y_max + dy + CELL_PX as f32, self.rows),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Depth in millimetres from a rule in pixels.
+    fn depth(rule: impl Fn(usize, usize) -> u16) -> DepthImage {
+        let mut raw = Image::new(320, 240);
+        for y in 0..240 {
+            raw.row_mut(y).iter_mut().enumerate().for_each(|(x, d)| *d = rule(x, y));
+        }
+        DepthImage { raw, metres_per_unit: 0.001 }
+    }
+
+    /// A trunk at 2 m, an arm that reaches to 1.5 m, a gap without depth beside it, a wall at 4 m.
+    fn somebody(x: usize, y: usize) -> u16 {
+        match (x, y) {
+            (100..150, 40..) => 2000,
+            (150..200, 100..120) => 2000 - 10 * (x as u16 - 150),
+            (90..100, 40..) => 0,
+            _ => 4000,
+        }
+    }
+
+    fn outlined(near_m: f32) -> BodyMask {
+        let (config, mut bodies) = (DynamicConfig::default(), BodyMask::default());
+        bodies.begin(&depth(somebody));
+        let bbox = BoundingBox { x_min: 92.0, y_min: 40.0, x_max: 195.0, y_max: 240.0 };
+        bodies.grow(&config, &bbox, near_m);
+        bodies
+    }
+
+    #[test]
+    fn a_body_is_followed_along_its_surface_and_over_gaps_but_not_onto_the_wall() {
+        let bodies = outlined(2.0);
+        for on_body in [[120.0, 100.0], [190.0, 110.0], [98.0, 150.0]] {
+            assert!(bodies.covers(on_body, 0.0), "{on_body:?}");
+        }
+        for beside in [[170.0, 60.0], [170.0, 200.0], [60.0, 150.0]] {
+            assert!(!bodies.covers(beside, 2.0), "{beside:?}");
+        }
+        assert!(bodies.covers([153.0, 60.0], 6.0), "the edge");
+    }
+
+    #[test]
+    fn what_one_body_leaves_free_is_asked_about_the_next() {
+        let (bodies, mut free) = (outlined(2.0), Vec::new());
+        bodies.free_depths(&BoundingBox { x_min: 100.0, y_min: 40.0, x_max: 200.0, y_max: 240.0 }, &mut free);
+        assert!(!free.is_empty() && free.iter().all(|z| *z == 4.0), "{free:?}");
+    }
+
+    #[test]
+    fn a_mask_marks_what_it_covers() {
+        let (mut bodies, mut mask) = (BodyMask::default(), Image::new(320, 240));
+        bodies.begin(&depth(|_, _| 4000));
+        mask.row_mut(50)[98] = 3u8;
+        bodies.mark_mask(&mask);
+        assert!(bodies.covers([98.0, 50.0], 0.0) && !bodies.covers([110.0, 50.0], 2.0));
+    }
+}
