@@ -248,6 +248,17 @@ config_section! {
         min_inliers: usize = 40,
         /// As `relocalise_min_likeness`, for a keyframe in an old place: a wrong loop ruins the map.
         min_likeness: f64 = 0.25,
+        /// The same where the loop would take away more drift than the four limits below allow. Opposite corridors looked alike up to
+        /// 0.31, right places up to 0.95.
+        min_likeness_of_jump: f64 = 0.6,
+        /// Drift that needs no way, m.
+        max_drift_m: f64 = 0.3,
+        /// Drift for each metre of way, m. Feature-based RGB-D odometry drifts by a hundredth or so.
+        max_drift_m_per_m: f64 = 0.05,
+        /// Drift that needs no way, degrees.
+        max_drift_deg: f64 = 5.0,
+        /// Drift for each metre of way, degrees.
+        max_drift_deg_per_m: f64 = 1.0,
         /// Shared landmarks that make an edge of the pose graph. Source: ORB-SLAM.
         strong_weight: usize = 100,
     }

@@ -10,6 +10,7 @@
 
 mod correct;
 mod index;
+mod plausible;
 mod recognise;
 mod verify;
 
@@ -37,6 +38,8 @@ pub struct LoopClosed {
     pub inliers: usize,
     /// How the keyframe's estimate differed from the old place's: `t_estimated_located`, in the camera's frame.
     pub drift: Pose,
+    /// The motion between the two, as measured.
+    pub t_keyframe_to: Pose,
 }
 
 /// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then. Of several places that it may show
@@ -99,14 +102,21 @@ impl LoopCloser {
         let candidates =
             old_places(&mut recogniser.lock().unwrap_or_else(PoisonError::into_inner), config, map, keyframe);
         for place in self.consistent_ones(config, candidates) {
-            let needed = Evidence { inliers: config.loops.min_inliers, likeness: config.loops.min_likeness };
+            let c = &config.loops;
+            let needed = Evidence { inliers: c.min_inliers, likeness: c.min_likeness };
             let found = verify::locate(sensor, config, map, &place, &mut self.frame, &needed);
-            let Some(Evidence { inliers, .. }) = found else { continue };
+            let Some(evidence) = found else { continue };
             let drift = estimated * self.frame.t_cam_world.inverse();
+            let plausible = plausible::is_plausible(c, map, keyframe, place.keyframe, &drift);
+            tracing::debug!(?evidence, %drift, plausible, "an old place");
+            if !plausible && evidence.likeness < c.min_likeness_of_jump {
+                continue;
+            }
+            let t_keyframe_to = self.frame.t_cam_world * map.keyframe(place.keyframe)?.t_cam_world.inverse();
             correct::close(sensor, config, map, keyframe, &place, &self.frame);
             self.last_loop = Some(sequence);
             self.consistent.clear();
-            return Some(LoopClosed { keyframe, to: place.keyframe, inliers, drift });
+            return Some(LoopClosed { keyframe, to: place.keyframe, inliers: evidence.inliers, drift, t_keyframe_to });
         }
         None
     }
