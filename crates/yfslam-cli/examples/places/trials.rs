@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use yfslam::map::persist::decode;
-use yfslam::{Config, MapUse, Slam};
+use yfslam::{Config, MapUse, Slam, Tracked};
 use yfslam_io::{Fault, FaultInjector, FaultKind};
 
 use crate::film::Film;
@@ -28,7 +28,7 @@ struct Trial {
     covered_s: i64,
     /// Frames of a known view until one was tracked.
     frames: Option<usize>,
-    /// Whether a pose after the cover was wrong.
+    /// Whether a pose was wrong, or given while the camera was covered.
     wrong: bool,
     /// The longest that a frame took while lost.
     slowest: Duration,
@@ -120,32 +120,21 @@ impl<'a> Known<'a> {
             let begun = std::time::Instant::now();
             let tracked = slam.track(&delivery.frame)?;
             let elapsed_ns = delivery.frame.timestamp_ns - first_ns;
+            let covered = fault.strikes(elapsed_ns);
+            let reference = self.poses[film.frame_at(shown)];
+            if tracked.t_world_cam.is_some_and(|pose| covered || self.is_wrong(shown, &tracked, &pose)) {
+                trial.wrong = true;
+            }
             if elapsed_ns < cover_ns {
                 continue;
             }
             if trial.frames.is_none() {
                 trial.slowest = trial.slowest.max(begun.elapsed());
             }
-            let covered = fault.strikes(elapsed_ns);
-            let reference = self.poses[film.frame_at(shown)];
             known_views += usize::from(!covered && reference.is_some());
-            match (tracked.t_world_cam, covered, reference) {
-                // Nothing can be seen: any pose is made up.
-                (Some(_), true, _) => trial.wrong = true,
-                (Some(pose), false, Some(reference)) => {
-                    trial.frames.get_or_insert(known_views);
-                    let error = reference.inverse() * pose;
-                    let (m, deg) = (error.translation.vector.norm(), error.rotation.angle().to_degrees());
-                    if m > WRONG_BEYOND.0 || deg > WRONG_BEYOND.1 {
-                        eprintln!(
-                            "{}: covered {covered_s} s from frame {start}: {m:.2} m, {deg:.1} deg at {shown}",
-                            film.name
-                        );
-                        trial.wrong = true;
-                    }
-                    tracked_since += 1;
-                }
-                _ => {}
+            if tracked.t_world_cam.is_some() {
+                trial.frames.get_or_insert(known_views);
+                tracked_since += 1;
             }
             if known_views >= AT_MOST || tracked_since >= WITHIN {
                 break;
@@ -155,6 +144,17 @@ impl<'a> Known<'a> {
             eprintln!("{}: covered {covered_s} s from frame {start}: found after {:?}", film.name, trial.frames);
         }
         Ok(trial)
+    }
+
+    fn is_wrong(&self, shown: usize, tracked: &Tracked, pose: &Isometry3<f64>) -> bool {
+        let Some(reference) = self.poses[self.film.frame_at(shown)] else { return false };
+        let error = reference.inverse() * pose;
+        let (m, deg) = (error.translation.vector.norm(), error.rotation.angle().to_degrees());
+        let wrong = m > WRONG_BEYOND.0 || deg > WRONG_BEYOND.1;
+        if wrong {
+            eprintln!("{}: {m:.2} m and {deg:.1} deg off in frame {shown}, {} inliers", self.film.name, tracked.inliers);
+        }
+        wrong
     }
 
     fn camera_in_map(&self) -> Result<Slam> {

@@ -232,6 +232,9 @@ impl Slam {
         self.owner.note(&mut self.tracker.sightings);
         if tracked {
             self.tracker.accept(self.owner.map());
+            if self.state != TrackingState::Tracking {
+                self.tracker.forget_motion();
+            }
         } else {
             self.tracker.reject();
         }

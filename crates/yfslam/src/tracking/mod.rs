@@ -151,6 +151,11 @@ impl Tracker {
         }
     }
 
+    /// Forgets the motion: the last frame's pose is not one to measure it from.
+    pub fn forget_motion(&mut self) {
+        self.velocity = None;
+    }
+
     /// Ends a frame that could not be tracked: its pose stays that of the last one.
     pub fn reject(&mut self) {
         self.velocity = None;
