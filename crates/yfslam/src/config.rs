@@ -137,9 +137,9 @@ config_section! {
         local_ratio: f32 = 0.8,
         /// Least cosine between viewing direction and the landmark's mean direction. Source: ORB-SLAM2.
         min_view_cosine: f64 = 0.5,
-        /// A map with at most this many keyframes is begun anew when tracking stays lost. Source: ORB-SLAM2.
+        /// A submap with at most this many keyframes is given up when tracking stays lost. Source: ORB-SLAM2.
         reset_max_keyframes: usize = 5,
-        /// Time over which nothing is recognised before that is done, s.
+        /// Time over which there is enough to see for a map and nothing is recognised, before a new submap is begun, s.
         reset_after_s: f64 = 3.0,
         /// Time between frames after which the velocity is no longer believed, s.
         max_gap_s: f64 = 0.5,

@@ -152,7 +152,10 @@ impl<'a> Known<'a> {
         let (m, deg) = (error.translation.vector.norm(), error.rotation.angle().to_degrees());
         let wrong = m > WRONG_BEYOND.0 || deg > WRONG_BEYOND.1;
         if wrong {
-            eprintln!("{}: {m:.2} m and {deg:.1} deg off in frame {shown}, {} inliers", self.film.name, tracked.inliers);
+            eprintln!(
+                "{}: {m:.2} m and {deg:.1} deg off in frame {shown}, {} inliers",
+                self.film.name, tracked.inliers
+            );
         }
         wrong
     }

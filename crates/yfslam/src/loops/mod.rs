@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! features ─► recognise ─► verify ─► correct
-//!             which place?  P3P       join, pose graph, bundle adjustment
+//!             which place?  P3P       join, pose graph ─► whole: bundle adjustment
 //! ```
 //!
 //! In: keyframes, and frames whose pose is unknown. Out: poses, and a map without the drift of a way that led back.
@@ -13,6 +13,7 @@ mod index;
 mod plausible;
 mod recognise;
 mod verify;
+mod whole;
 
 use std::sync::{Mutex, PoisonError};
 
@@ -26,6 +27,7 @@ use crate::tracking::{Sight, TrackedFrame};
 use recognise::Candidate;
 pub use recognise::Recogniser;
 use verify::Evidence;
+pub use whole::WholeAdjustment;
 
 /// A loop that was closed.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +42,8 @@ pub struct LoopClosed {
     pub drift: Pose,
     /// The motion between the two, as measured.
     pub t_keyframe_to: Pose,
+    /// Whether the old place was of another submap, so that two became one: `drift` is then the motion between their worlds.
+    pub merged_submaps: bool,
 }
 
 /// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then. Of several places that it may show
@@ -83,7 +87,7 @@ impl LoopCloser {
         self.last_loop = None;
     }
 
-    /// Looks whether a new keyframe shows an old place, and closes the loop if so.
+    /// Looks whether a new keyframe shows an old place, and closes the loop if so; the map is then to be adjusted as a whole.
     pub fn close(
         &mut self,
         sensor: &SensorModel,
@@ -113,10 +117,18 @@ impl LoopCloser {
                 continue;
             }
             let t_keyframe_to = self.frame.t_cam_world * map.keyframe(place.keyframe)?.t_cam_world.inverse();
+            let merged_submaps = map.root(keyframe) != map.root(place.keyframe);
             correct::close(sensor, config, map, keyframe, &place, &self.frame);
             self.last_loop = Some(sequence);
             self.consistent.clear();
-            return Some(LoopClosed { keyframe, to: place.keyframe, inliers: evidence.inliers, drift, t_keyframe_to });
+            return Some(LoopClosed {
+                keyframe,
+                to: place.keyframe,
+                inliers: evidence.inliers,
+                drift,
+                t_keyframe_to,
+                merged_submaps,
+            });
         }
         None
     }

@@ -1,6 +1,7 @@
 //! The whole path from a frame to its pose, on one page.
 
 mod errors;
+mod results;
 
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
@@ -10,16 +11,16 @@ use crate::camera::Camera;
 use crate::config::Config;
 use crate::detection::{Detection, Detector};
 use crate::detector_thread::DetectorThread;
-use crate::dynamic::{DynamicFilter, Method, Region};
+use crate::dynamic::{DynamicFilter, Method};
 use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
 use crate::image::{GrayImage, gray_from_rgb};
 use crate::loops::{LoopClosed, relocalise};
-use crate::map::persist::{MapError, SavedMap, encode};
+use crate::map::persist::SavedMap;
 use crate::map::{KeyFrameId, Map};
 use crate::sensor::SensorModel;
-use crate::tracking::{TrackedFrame, Tracker, TrackingState};
+use crate::tracking::{Tracker, TrackingState};
 pub use errors::{FrameRejected, SetupError};
 
 /// What became of one frame.
@@ -95,8 +96,8 @@ pub struct Slam {
     detector_failures: usize,
     last_timestamp_ns: Option<i64>,
     resets: usize,
-    /// Time of the last frame that was tracked, ns.
-    last_tracked_ns: Option<i64>,
+    /// Time since when frames show enough for a map and are not recognised, ns.
+    unknown_since_ns: Option<i64>,
     /// Frames that were worth keeping when mapping was busy.
     passed_over: usize,
     /// How a map from an earlier session is used; `None` if the map is all of this one.
@@ -138,7 +139,7 @@ impl Slam {
             detector_failures: 0,
             last_timestamp_ns: None,
             resets: 0,
-            last_tracked_ns: None,
+            unknown_since_ns: None,
             passed_over: 0,
             map_use: None,
             first_keyframe: 0,
@@ -214,7 +215,7 @@ impl Slam {
             loop_closed = times.note(&inserted);
         }
         let tracked = match self.state {
-            TrackingState::NotInitialized => self.has_enough_to_start(),
+            TrackingState::NotInitialized => self.owner.is_free() && self.has_enough_to_start(),
             TrackingState::Tracking => {
                 let min_inliers = self.config.tracking.local_min_inliers;
                 let map = self.owner.map();
@@ -242,7 +243,8 @@ impl Slam {
         let is_keyframe = tracked && self.wants_keyframe();
         if is_keyframe {
             self.tracker.offered_keyframe();
-            if let Some(inserted) = self.owner.insert(&self.tracker.current, &frame.color) {
+            let is_first = self.state == TrackingState::NotInitialized;
+            if let Some(inserted) = self.owner.insert(&self.tracker.current, &frame.color, is_first) {
                 self.tracker.became_keyframe(inserted.keyframe, self.owner.map());
                 loop_closed = times.note(&inserted);
             }
@@ -250,11 +252,11 @@ impl Slam {
         self.state = match (tracked, self.state) {
             (true, _) => TrackingState::Tracking,
             (false, TrackingState::NotInitialized) => TrackingState::NotInitialized,
-            (false, _) if self.is_map_worthless(frame.timestamp_ns) => self.reset(),
+            (false, _) if self.is_elsewhere(frame.timestamp_ns) => self.begin_submap(),
             (false, _) => TrackingState::Lost,
         };
         if tracked {
-            self.last_tracked_ns = Some(frame.timestamp_ns);
+            self.unknown_since_ns = None;
         }
         self.note_anchor(frame.timestamp_ns);
         Ok(Tracked {
@@ -361,25 +363,36 @@ impl Slam {
         free
     }
 
-    /// Whether a fresh start is worth more than the map (ORB-SLAM2): it is young, all of this session, and nothing in it was recognised
-    /// for a while.
-    fn is_map_worthless(&self, now_ns: i64) -> bool {
-        let c = &self.config.tracking;
-        let lost_s = self.last_tracked_ns.map_or(f64::INFINITY, |then| now_ns.saturating_sub(then) as f64 * 1e-9);
-        self.map_use.is_none() && self.owner.map().keyframe_count() <= c.reset_max_keyframes && lost_s > c.reset_after_s
+    /// Whether the camera has seen enough for a map for a while, and nothing in it was recognised.
+    fn is_elsewhere(&mut self, now_ns: i64) -> bool {
+        if self.map_use == Some(MapUse::Localise) || !self.has_enough_to_start() {
+            self.unknown_since_ns = None;
+            return false;
+        }
+        let since_ns = *self.unknown_since_ns.get_or_insert(now_ns);
+        now_ns.saturating_sub(since_ns) as f64 * 1e-9 > self.config.tracking.reset_after_s
     }
 
-    /// Throws the map away and starts over with the next frame. The poses that hung on it go with it.
-    fn reset(&mut self) -> TrackingState {
-        tracing::warn!(
-            keyframes = self.owner.map().keyframe_count(),
-            "lost soon after the start: the map is begun anew"
-        );
-        self.owner.reset();
-        self.anchors.clear();
-        self.last_tracked_ns = None;
+    /// Begins a submap with the next frame, in a world that continues where the camera was lost. The old one stays, to be recognised
+    /// and joined, unless it is so young that a fresh start is worth more (ORB-SLAM2): then the poses that hung on it go with it.
+    fn begin_submap(&mut self) -> TrackingState {
+        self.unknown_since_ns = None;
+        let map = self.owner.map();
+        let root = self.tracker.reference().and_then(|reference| map.root(reference));
+        let young = self.config.tracking.reset_max_keyframes;
+        let keyframes = root.map_or(0, |root| map.submap_size(root, young + 1));
+        if map.keyframe_count() <= young {
+            tracing::warn!(keyframes, "lost soon after the start: the map is begun anew");
+            self.owner.reset();
+            self.anchors.clear();
+            self.resets += 1;
+        } else {
+            tracing::warn!(keyframes, "nothing was recognised: a new submap is begun");
+            if let Some(root) = root.filter(|_| keyframes <= young) {
+                self.owner.forget(root);
+            }
+        }
         self.tracker.reset();
-        self.resets += 1;
         TrackingState::NotInitialized
     }
 
@@ -389,71 +402,6 @@ impl Slam {
         {
             self.anchors.push(Anchor { timestamp_ns, reference, t_cam_reference });
         }
-    }
-
-    /// Waits for mapping that is under way on its own thread, so that [`Slam::map`] and [`Slam::trajectory`] tell all. Returns the loop
-    /// that it closed.
-    pub fn settle(&mut self) -> Option<LoopClosed> {
-        self.owner.settle()?.loop_closed
-    }
-
-    /// Frames that were worth a keyframe while mapping was busy on its own thread.
-    pub fn passed_over(&self) -> usize {
-        self.passed_over
-    }
-
-    /// Poses of all tracked frames (world from camera) as the map has them now.
-    pub fn trajectory(&self) -> Vec<(i64, Pose)> {
-        self.anchors
-            .iter()
-            .filter_map(|a| {
-                let t_cam_world = a.t_cam_reference * self.owner.map().keyframe_pose(a.reference)?;
-                Some((a.timestamp_ns, t_cam_world.inverse()))
-            })
-            .collect()
-    }
-
-    /// How often the map was begun anew because tracking was lost soon after the start. Poses given out before belong to another world.
-    pub fn resets(&self) -> usize {
-        self.resets
-    }
-
-    /// Frames on which the detector failed.
-    pub fn detector_failures(&self) -> usize {
-        self.detector_failures
-    }
-
-    /// The last frame: features with their trust, matches, pose.
-    pub fn last_frame(&self) -> &TrackedFrame {
-        &self.tracker.current
-    }
-
-    /// The boxes of movable objects in the last frame, at any score.
-    pub fn last_boxes(&self) -> &[Detection] {
-        &self.movable
-    }
-
-    /// The parts of the last frame that were found to move.
-    pub fn moving_regions(&self) -> &[Region] {
-        self.filter.regions()
-    }
-
-    /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
-    pub fn first_keyframe(&self) -> u64 {
-        self.first_keyframe
-    }
-
-    /// The map as bytes, for [`crate::map::persist::decode`].
-    ///
-    /// # Errors
-    /// If it cannot be written, which would be a fault of this program.
-    pub fn save_map(&self) -> Result<Vec<u8>, MapError> {
-        encode(self.map(), &self.sensor.camera, &self.config.features)
-    }
-
-    /// The map: with mapping on its own thread, as it was after the last keyframe that is finished.
-    pub fn map(&self) -> &Map {
-        self.owner.map()
     }
 }
 

@@ -195,6 +195,11 @@ impl Tracker {
         }
     }
 
+    /// The keyframe that the last tracked frame shares most with.
+    pub fn reference(&self) -> Option<KeyFrameId> {
+        self.reference
+    }
+
     /// Forgets everything but its buffers, as after a start.
     pub fn reset(&mut self) {
         self.velocity = None;
