@@ -108,7 +108,8 @@ impl Film {
         RgbdFrame { timestamp_ns: self.stamp_ns(shown), ..self.frames[self.frame_at(shown)].clone() }
     }
 
-    fn stamp_ns(&self, shown: usize) -> i64 {
+    /// The time of what is shown as number `shown`.
+    pub fn stamp_ns(&self, shown: usize) -> i64 {
         shown as i64 * self.period_ns()
     }
 

@@ -5,6 +5,7 @@
 //! cargo run --release -p yfslam-cli --example places -- loops corridor_loop walking_xyz DATA/rgbd/tum_fr1_xyz_dev
 //! cargo run --release -p yfslam-cli --example places -- trials --count 200 SEQUENCE...
 //! cargo run --release -p yfslam-cli --example places -- soak --rounds 20 SEQUENCE
+//! cargo run --release -p yfslam-cli --example places -- strangers corridor_loop
 //! cargo run --release -p yfslam-cli --example places -- live SEQUENCE...
 //! ```
 //!
@@ -16,6 +17,7 @@ mod film;
 mod live;
 mod loops;
 mod soak;
+mod strangers;
 mod trials;
 
 use std::path::PathBuf;
@@ -58,6 +60,12 @@ enum Question {
         #[arg(long, default_value_t = 20)]
         rounds: usize,
     },
+    /// Whether places that are not in the map are taken for places that are: the first part is mapped, the whole is sought in it.
+    Strangers {
+        /// Share of the sequence that is mapped.
+        #[arg(long, default_value_t = 0.45)]
+        mapped: f64,
+    },
     /// A live camera: frames at 30 Hz, mapping on its own thread; start-up; localisation in the saved map.
     Live,
 }
@@ -75,6 +83,7 @@ fn main() -> Result<()> {
             trials::table(&config, count, seed, arguments.sequences.len(), arguments.sequences.iter().map(open))
         }
         Question::Soak { rounds } => soak::table(&config, rounds, arguments.sequences.iter().map(open)),
+        Question::Strangers { mapped } => strangers::table(&config, mapped, arguments.sequences.iter().map(open)),
         Question::Live => live::table(&config, arguments.sequences.iter().map(open)),
     }
 }

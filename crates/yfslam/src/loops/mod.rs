@@ -17,6 +17,7 @@ mod whole;
 
 use std::sync::{Mutex, PoisonError};
 
+use nalgebra::Point3;
 use slotmap::SecondaryMap;
 
 use crate::config::Config;
@@ -46,14 +47,33 @@ pub struct LoopClosed {
     pub merged_submaps: bool,
 }
 
+/// Where a camera that is lost can be at most.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach {
+    /// The keyframe that it was last seen from.
+    pub reference: KeyFrameId,
+    /// Where it was then, in the world of that keyframe, m.
+    pub center_world: Point3<f64>,
+    /// How far it can have come since, m.
+    pub radius_m: f64,
+}
+
+impl Reach {
+    fn includes(&self, map: &Map, place: KeyFrameId, t_cam_world: &Pose) -> bool {
+        let center = t_cam_world.inverse_transform_point(&Point3::origin());
+        (center - self.center_world).norm() <= self.radius_m && map.root(place) == map.root(self.reference)
+    }
+}
+
 /// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then. Of several places that it may show
-/// the likeliest is taken.
+/// the likeliest is taken; one beyond `reach` has to be likelier still.
 pub fn relocalise(
     recogniser: &mut Recogniser,
     sensor: &SensorModel,
     config: &Config,
     map: &Map,
     frame: &mut TrackedFrame,
+    reach: Option<&Reach>,
 ) -> bool {
     let c = &config.places;
     let candidates = recogniser.candidates(c, map, &frame.features, |_| true);
@@ -61,6 +81,11 @@ pub fn relocalise(
     let mut best: Option<(f64, Pose, Vec<Option<Sight>>)> = None;
     for place in &candidates {
         let Some(evidence) = verify::locate(sensor, config, map, place, frame, &needed) else { continue };
+        let within = reach.is_some_and(|reach| reach.includes(map, place.keyframe, &frame.t_cam_world));
+        tracing::debug!(?evidence, within, "a place to be found at");
+        if !within && evidence.likeness < c.relocalise_min_likeness_beyond {
+            continue;
+        }
         if best.as_ref().is_none_or(|(likeness, ..)| evidence.likeness > *likeness) {
             best = Some((evidence.likeness, frame.t_cam_world, frame.sights.clone()));
         }

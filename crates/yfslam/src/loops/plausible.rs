@@ -14,8 +14,8 @@ use crate::map::{KeyFrameId, Map};
 
 /// Whether the camera can have drifted by `drift` between the two keyframes.
 pub fn is_plausible(config: &LoopConfig, map: &Map, from: KeyFrameId, to: KeyFrameId, drift: &Pose) -> bool {
-    // Keyframes without any way between them are of maps that have nothing to do with each other.
-    let Some(way) = way_between(map, from, to) else { return true };
+    // Between two submaps there is no way, and nothing to be explained by it.
+    let Some(way) = way_between(map, from, to) else { return false };
     let (shift_m, turn_deg) = (drift.translation.vector.norm(), drift.rotation.angle().to_degrees());
     shift_m <= config.max_drift_m + config.max_drift_m_per_m * way
         && turn_deg <= config.max_drift_deg + config.max_drift_deg_per_m * way

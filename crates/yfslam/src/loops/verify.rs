@@ -13,7 +13,7 @@ use crate::geometry::{Pose, p3p};
 use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
 use crate::optimize::residual::Measurement;
 use crate::sensor::SensorModel;
-use crate::tracking::search::search_local_map;
+use crate::tracking::search::{Projector, search_local_map};
 use crate::tracking::{Sight, TrackedFrame};
 
 /// What speaks for a pose.
@@ -22,7 +22,7 @@ pub struct Evidence {
     /// Landmarks that fit it.
     pub inliers: usize,
     /// Landmarks that fit it and look the same, as a share of what tracking would find there, going by how often it found each of those
-    /// in view. Corridors are alike in their doors and lamps: there many landmarks fit, but more are missing.
+    /// in view and not behind what moves. Corridors are alike in their doors and lamps: there many landmarks fit, but more are missing.
     pub likeness: f64,
 }
 
@@ -63,15 +63,28 @@ pub fn locate(
         visible.extend(frame.sights.iter().flatten().filter_map(|sight| sight.landmark));
         visible.sort_unstable();
         visible.dedup();
-        expected = visible.iter().filter_map(|id| map.landmark(*id)).map(Landmark::found_ratio).sum();
+        let projector = Projector::new(sensor, &frame.t_cam_world);
+        let in_view = visible.iter().filter_map(|id| map.landmark(*id));
+        expected = in_view.filter(|l| !is_hidden(c, &projector, frame, l)).map(Landmark::found_ratio).sum();
         inliers = frame.refine_pose(sensor, &config.pose);
     }
+    let projector = Projector::new(sensor, &frame.t_cam_world);
     let alike = frame.sights.iter().zip(&frame.features.descriptors).filter(|(sight, seen)| {
         let landmark = sight.and_then(|s| map.landmark(s.landmark?));
-        landmark.is_some_and(|l| l.descriptor.distance(seen) <= c.max_distance)
+        landmark.is_some_and(|l| l.descriptor.distance(seen) <= c.max_distance && !is_hidden(c, &projector, frame, l))
     });
     let evidence = Evidence { inliers, likeness: alike.count() as f64 / expected.max(1.0) };
     evidence.suffices(needed).then_some(evidence)
+}
+
+/// Whether something that moves is where the landmark should be seen: it may stand in front of it.
+fn is_hidden(config: &PlaceConfig, projector: &Projector<'_>, frame: &TrackedFrame, landmark: &Landmark) -> bool {
+    let Some(projection) = projector.project(&landmark.position) else { return false };
+    let mut hidden = false;
+    frame.features.for_each_near(projection.u, projection.v, config.hidden_radius_px, 0..=u8::MAX, |j| {
+        hidden |= frame.features.features[j].trust <= 0.0;
+    });
+    hidden
 }
 
 /// Landmarks that the keyframes see and the frame is not matched to.

@@ -6,6 +6,8 @@ mod results;
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
+use nalgebra::Point3;
+
 use crate::backend::{Backend, Execution, Inserted, MapOwner};
 use crate::camera::Camera;
 use crate::config::Config;
@@ -16,7 +18,7 @@ use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
 use crate::image::{GrayImage, gray_from_rgb};
-use crate::loops::{LoopClosed, relocalise};
+use crate::loops::{LoopClosed, Reach, relocalise};
 use crate::map::persist::SavedMap;
 use crate::map::{KeyFrameId, Map};
 use crate::sensor::SensorModel;
@@ -347,9 +349,22 @@ impl Slam {
 
     /// Seeks the frame of a camera that was lost in the whole map.
     fn find_again(&mut self) -> bool {
+        let reach = self.reach();
         let recogniser = self.owner.recogniser();
         let mut recogniser = recogniser.lock().unwrap_or_else(PoisonError::into_inner);
-        relocalise(&mut recogniser, &self.sensor, &self.config, self.owner.map(), &mut self.tracker.current)
+        let map = self.owner.map();
+        relocalise(&mut recogniser, &self.sensor, &self.config, map, &mut self.tracker.current, reach.as_ref())
+    }
+
+    /// Where the camera can have come since it was lost; `None` after too long a time, or if it never was tracked.
+    fn reach(&self) -> Option<Reach> {
+        let c = &self.config.places;
+        let last = self.anchors.last()?;
+        let lost_s = self.tracker.current.timestamp_ns.saturating_sub(last.timestamp_ns) as f64 * 1e-9;
+        let t_cam_world = last.t_cam_reference * self.owner.map().keyframe_pose(last.reference)?;
+        let center_world = t_cam_world.inverse_transform_point(&Point3::origin());
+        let reach = Reach { reference: last.reference, center_world, radius_m: c.max_speed_m_per_s * (lost_s + 1.0) };
+        (lost_s <= c.max_reach_s).then_some(reach)
     }
 
     /// Whether the frame is to become a keyframe, and can.
