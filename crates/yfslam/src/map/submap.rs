@@ -34,13 +34,12 @@ impl Map {
 
     /// Number of keyframes in the submap of `keyframe`, counted up to `at_most`.
     pub fn submap_size(&self, keyframe: KeyFrameId, at_most: usize) -> usize {
-        let mut open: Vec<KeyFrameId> = self.root(keyframe).into_iter().collect();
-        let mut at = 0;
-        while let Some(k) = open.get(at).and_then(|id| self.keyframes.get(*id)).filter(|_| open.len() < at_most) {
-            open.extend(&k.children);
-            at += 1;
-        }
-        open.len().min(at_most)
+        self.root(keyframe).map_or(0, |root| self.tree_size(root, at_most))
+    }
+
+    fn tree_size(&self, top: KeyFrameId, at_most: usize) -> usize {
+        let Some(k) = self.keyframes.get(top).filter(|_| at_most > 0) else { return 0 };
+        k.children.iter().fold(1, |size, child| size + self.tree_size(*child, at_most - size))
     }
 
     /// Number of submaps.
