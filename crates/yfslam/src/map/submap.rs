@@ -161,10 +161,8 @@ mod tests {
     fn a_welded_map_is_read_back_as_one() {
         let (_, mut map, first, second, other_world) = apart();
         map.weld(second[3], first[3], &other_world);
-        let camera = crate::Camera { fps: 30.0, ..crate::map::scene::camera() };
-        let mut features = crate::config::FeatureConfig::default();
-        features.levels = 1;
-        let bytes = crate::map::persist::encode(&map, &camera, &features).unwrap();
+        let features = crate::config::FeatureConfig { levels: 1, ..Default::default() };
+        let bytes = crate::map::persist::encode(&map, &crate::map::scene::camera(), &features).unwrap();
         let read = crate::map::persist::decode(&bytes).unwrap().map;
         assert_eq!((read.submap_count(), read.keyframe_count()), (1, 8));
     }
