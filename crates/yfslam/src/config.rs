@@ -227,6 +227,8 @@ config_section! {
         min_refined_inliers: usize = 10,
         /// Landmarks that must fit a frame that was lost. Source: ORB-SLAM2.
         relocalise_min_inliers: usize = 50,
+        /// Standard deviation of the camera's position up to which a place is believed, m: a few far landmarks fit many poses.
+        max_position_sigma_m: f64 = 0.05,
         /// Of the landmarks that tracking would find from there, the share that must fit and look the same, if the camera can have come
         /// there since it was lost.
         relocalise_min_likeness: f64 = 0.15,

@@ -11,6 +11,7 @@ use super::recognise::Candidate;
 use crate::config::{Config, PlaceConfig};
 use crate::geometry::{Pose, p3p};
 use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
+use crate::optimize::pose_only::{self, PoseObservation};
 use crate::optimize::residual::Measurement;
 use crate::sensor::SensorModel;
 use crate::tracking::search::{Projector, search_local_map};
@@ -34,7 +35,7 @@ impl Evidence {
 }
 
 /// Locates `frame` in the place of `candidate`. Pose and matches are then those of the frame. `None` if the evidence is less than
-/// `needed`.
+/// `needed`, or leaves open where the camera is.
 pub fn locate(
     sensor: &SensorModel,
     config: &Config,
@@ -74,7 +75,23 @@ pub fn locate(
         landmark.is_some_and(|l| l.descriptor.distance(seen) <= c.max_distance && !is_hidden(c, &projector, frame, l))
     });
     let evidence = Evidence { inliers, likeness: alike.count() as f64 / expected.max(1.0) };
-    evidence.suffices(needed).then_some(evidence)
+    let is_fixed = position_sigma_m(sensor, frame) <= c.max_position_sigma_m;
+    (is_fixed && evidence.suffices(needed)).then_some(evidence)
+}
+
+/// How well the matches fix the camera's position, m.
+fn position_sigma_m(sensor: &SensorModel, frame: &TrackedFrame) -> f64 {
+    let matched =
+        frame.sights.iter().zip(&frame.features.features).filter_map(|(sight, feature)| Some(((*sight)?, feature)));
+    let observations: Vec<PoseObservation> = matched
+        .map(|(sight, feature)| PoseObservation {
+            point_world: sight.point_world,
+            measurement: sensor.measurement(feature),
+            trust: f64::from(feature.trust),
+            inlier: true,
+        })
+        .collect();
+    pose_only::position_sigma_m(&sensor.pinhole, &frame.t_cam_world, &observations)
 }
 
 /// Whether something that moves is where the landmark should be seen: it may stand in front of it.
