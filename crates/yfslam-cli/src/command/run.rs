@@ -249,20 +249,9 @@ fn summary(report: &Report, source: &Source, outcome: &Outcome) -> Result<String
 }
 
 fn places_summary(text: &mut String, places: &PlaceTally) -> Result<()> {
-    let (joins, loops): (Vec<_>, Vec<_>) = places.loops.iter().partition(|l| l.merged_submaps);
-    if !loops.is_empty() {
-        let drifts: Vec<_> = loops.iter().map(|l| format!("{:.2} m", l.drift_m)).collect();
-        writeln!(text, "loops closed: {}, after a drift of {}", loops.len(), drifts.join(", "))?;
-    }
-    if !joins.is_empty() {
-        writeln!(text, "submaps joined: {}", joins.len())?;
-    }
-    if places.frames_apart > 0 {
-        writeln!(
-            text,
-            "tracked in submaps that were not joined, and not in the trajectory: {} frames",
-            places.frames_apart
-        )?;
+    if !places.loops.is_empty() {
+        let drifts: Vec<_> = places.loops.iter().map(|l| format!("{:.2} m", l.drift_m)).collect();
+        writeln!(text, "loops closed: {}, after a drift of {}", places.loops.len(), drifts.join(", "))?;
     }
     if let Some(longest) = places.lost.iter().map(|stretch| stretch.frames).max() {
         let found = places.lost.iter().filter(|stretch| stretch.found_again).count();
