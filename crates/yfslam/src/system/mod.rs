@@ -393,10 +393,12 @@ impl Slam {
     fn begin_submap(&mut self) -> TrackingState {
         self.unknown_since_ns = None;
         let map = self.owner.map();
-        let root = self.tracker.reference().and_then(|reference| map.root(reference));
+        // What an earlier session left is kept in any case.
+        let is_own = |root: &KeyFrameId| map.keyframe(*root).is_some_and(|k| k.sequence >= self.first_keyframe);
+        let root = self.tracker.reference().and_then(|reference| map.root(reference)).filter(is_own);
         let young = self.config.tracking.reset_max_keyframes;
         let keyframes = root.map_or(0, |root| map.submap_size(root, young + 1));
-        if map.keyframe_count() <= young {
+        if map.keyframe_count() <= young && self.map_use.is_none() {
             tracing::warn!(keyframes, "lost soon after the start: the map is begun anew");
             self.owner.reset();
             self.anchors.clear();
