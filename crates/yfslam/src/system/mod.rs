@@ -98,8 +98,8 @@ pub struct Slam {
     detector_failures: usize,
     last_timestamp_ns: Option<i64>,
     resets: usize,
-    /// Time since when frames show enough for a map and are not recognised, ns.
-    unknown_since_ns: Option<i64>,
+    /// Frames since the camera was lost that showed enough for a map and were not recognised.
+    unknown_frames: usize,
     /// Frames that were worth keeping when mapping was busy.
     passed_over: usize,
     /// How a map from an earlier session is used; `None` if the map is all of this one.
@@ -141,7 +141,7 @@ impl Slam {
             detector_failures: 0,
             last_timestamp_ns: None,
             resets: 0,
-            unknown_since_ns: None,
+            unknown_frames: 0,
             passed_over: 0,
             map_use: None,
             first_keyframe: 0,
@@ -254,11 +254,11 @@ impl Slam {
         self.state = match (tracked, self.state) {
             (true, _) => TrackingState::Tracking,
             (false, TrackingState::NotInitialized) => TrackingState::NotInitialized,
-            (false, _) if self.is_elsewhere(frame.timestamp_ns) => self.begin_submap(),
+            (false, _) if self.is_elsewhere() => self.begin_submap(),
             (false, _) => TrackingState::Lost,
         };
         if tracked {
-            self.unknown_since_ns = None;
+            self.unknown_frames = 0;
         }
         self.note_anchor(frame.timestamp_ns);
         Ok(Tracked {
@@ -378,20 +378,20 @@ impl Slam {
         free
     }
 
-    /// Whether the camera has seen enough for a map for a while, and nothing in it was recognised.
-    fn is_elsewhere(&mut self, now_ns: i64) -> bool {
-        if self.map_use == Some(MapUse::Localise) || !self.has_enough_to_start() {
-            self.unknown_since_ns = None;
+    /// Whether the camera has seen enough for a map for a while, and nothing in it was recognised. Time in which there was nothing to
+    /// see does not count.
+    fn is_elsewhere(&mut self) -> bool {
+        if self.map_use == Some(MapUse::Localise) {
             return false;
         }
-        let since_ns = *self.unknown_since_ns.get_or_insert(now_ns);
-        now_ns.saturating_sub(since_ns) as f64 * 1e-9 > self.config.tracking.reset_after_s
+        self.unknown_frames += usize::from(self.has_enough_to_start());
+        self.unknown_frames as f64 > self.config.tracking.reset_after_s * self.sensor.camera.fps
     }
 
     /// Begins a submap with the next frame, in a world that continues where the camera was lost. The old one stays, to be recognised
     /// and joined, unless it is so young that a fresh start is worth more (ORB-SLAM2): then the poses that hung on it go with it.
     fn begin_submap(&mut self) -> TrackingState {
-        self.unknown_since_ns = None;
+        self.unknown_frames = 0;
         let map = self.owner.map();
         // What an earlier session left is kept in any case.
         let is_own = |root: &KeyFrameId| map.keyframe(*root).is_some_and(|k| k.sequence >= self.first_keyframe);
