@@ -27,6 +27,36 @@ fn a_camera_that_was_blinded_is_found_again_within_ten_frames() {
     assert!(ate_rmse(&report) < 0.015, "{}", ate_rmse(&report));
 }
 
+/// Once around a block of corridors and a little on, at ten frames a second.
+const AROUND: &str = "synth:corridor_loop?people=0&frames=440&fps=10&width=320&height=240";
+
+#[test]
+fn a_way_that_leads_back_closes_its_loop() {
+    let folder = tempfile::tempdir().unwrap();
+    succeeds(folder.path(), &["run", AROUND, "--method", "none", "--out", "out", "-q"]);
+    let report = report(&folder.path().join("out"));
+    let loops = report["places"]["loops"].as_array().unwrap();
+    assert!(loops.len() == 1 && loops[0]["merged_submaps"] == false, "{loops:?}");
+    assert!(loops[0]["drift_m"].as_f64().unwrap() < 0.6, "{loops:?}");
+    assert_eq!(report["frames"]["tracked"], 440);
+    assert!(ate_rmse(&report) < 0.05, "{}", ate_rmse(&report));
+}
+
+#[test]
+fn a_camera_put_elsewhere_maps_on_and_joins_both_maps_where_they_meet() {
+    let folder = tempfile::tempdir().unwrap();
+    // From the first corridor into the third; the way from there leads back to the first.
+    let fault = ["--fault", "dropped@6+24"];
+    succeeds(folder.path(), &[&["run", AROUND, "--method", "none", "--out", "out", "-q"], &fault[..]].concat());
+    let report = report(&folder.path().join("out"));
+    let loops = report["places"]["loops"].as_array().unwrap();
+    assert!(loops.len() == 1 && loops[0]["merged_submaps"] == true, "{loops:?}");
+    assert_eq!(report["places"]["frames_apart"], 0);
+    assert!(report["frames"]["tracked"].as_u64().unwrap() > 150);
+    // Two worlds taken for one would be metres off.
+    assert!(ate_rmse(&report) < 0.15, "{}", ate_rmse(&report));
+}
+
 #[test]
 fn a_map_is_found_back_into_and_stays_as_it_is_or_grows() {
     let folder = tempfile::tempdir().unwrap();

@@ -137,9 +137,9 @@ config_section! {
         local_ratio: f32 = 0.8,
         /// Least cosine between viewing direction and the landmark's mean direction. Source: ORB-SLAM2.
         min_view_cosine: f64 = 0.5,
-        /// A map with at most this many keyframes is begun anew when tracking stays lost. Source: ORB-SLAM2.
+        /// A submap with at most this many keyframes is given up when tracking stays lost. Source: ORB-SLAM2.
         reset_max_keyframes: usize = 5,
-        /// Time over which nothing is recognised before that is done, s.
+        /// Time over which there is enough to see for a map and nothing is recognised, before a new submap is begun, s.
         reset_after_s: f64 = 3.0,
         /// Time between frames after which the velocity is no longer believed, s.
         max_gap_s: f64 = 0.5,
@@ -228,9 +228,20 @@ config_section! {
         min_refined_inliers: usize = 10,
         /// Landmarks that must fit a frame that was lost. Source: ORB-SLAM2.
         relocalise_min_inliers: usize = 50,
-        /// Of the landmarks that tracking would find from there, the share that must fit and look the same. In a corridor whose doors and
-        /// lamps repeat, of 1,200 wrong places one in a hundred reached 0.15, none 0.17; right ones had 0.18 to 0.83.
+        /// Standard deviation of the camera's position up to which a place is believed, m: a few far landmarks fit many poses.
+        max_position_sigma_m: f64 = 0.05,
+        /// Of the landmarks that tracking would find from there, the share that must fit and look the same, if the camera can have come
+        /// there since it was lost.
         relocalise_min_likeness: f64 = 0.15,
+        /// The same for any other place. In corridors whose doors and lamps repeat, places that the map does not have were taken for
+        /// others with up to 0.34; right ones had 0.36 to 1.2.
+        relocalise_min_likeness_beyond: f64 = 0.4,
+        /// Speed up to which a camera that is lost is thought to move on, m/s.
+        max_speed_m_per_s: f64 = 1.5,
+        /// Time after which it may be anywhere, s.
+        max_reach_s: f64 = 3.0,
+        /// Distance from a feature on something that moves within which a landmark may be hidden, px.
+        hidden_radius_px: f32 = 20.0,
         /// Seed of the random draws.
         seed: u64 = 0,
     }
@@ -249,6 +260,17 @@ config_section! {
         min_inliers: usize = 40,
         /// As `relocalise_min_likeness`, for a keyframe in an old place: a wrong loop ruins the map.
         min_likeness: f64 = 0.25,
+        /// The same where the loop would take away more drift than the four limits below allow, and between submaps. Opposite corridors
+        /// looked alike up to 0.34, right places up to 0.95.
+        min_likeness_of_jump: f64 = 0.5,
+        /// Drift that needs no way, m.
+        max_drift_m: f64 = 0.3,
+        /// Drift for each metre of way, m. Feature-based RGB-D odometry drifts by a hundredth or so.
+        max_drift_m_per_m: f64 = 0.05,
+        /// Drift that needs no way, degrees.
+        max_drift_deg: f64 = 5.0,
+        /// Drift for each metre of way, degrees.
+        max_drift_deg_per_m: f64 = 1.0,
         /// Shared landmarks that make an edge of the pose graph. Source: ORB-SLAM.
         strong_weight: usize = 100,
     }

@@ -192,6 +192,8 @@ impl Pipeline {
     pub fn finish(mut self, config: &Config) -> Result<Outcome> {
         self.settle();
         self.places.keyframes_passed_over = self.slam.passed_over();
+        let of_submaps: Vec<usize> = self.slam.trajectories().iter().map(Vec::len).collect();
+        self.places.frames_apart = of_submaps.iter().sum::<usize>() - of_submaps.iter().max().copied().unwrap_or(0);
         let wall = self.started.elapsed();
         self.frames.detector_failures = self.slam.detector_failures();
         if self.frames.tracked == 0 {

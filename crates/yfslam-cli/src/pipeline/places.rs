@@ -14,6 +14,8 @@ pub struct PlaceTally {
     pub lost: Vec<LostStretch>,
     /// Frames that were worth a keyframe while mapping was busy, with --threaded.
     pub keyframes_passed_over: usize,
+    /// Tracked frames that are not in the trajectory: those of submaps that were not joined with the one that has most.
+    pub frames_apart: usize,
 }
 
 /// A loop that was closed.
@@ -27,6 +29,8 @@ pub struct Loop {
     pub drift_m: f64,
     /// Angle likewise, degrees.
     pub drift_deg: f64,
+    /// Whether it joined two submaps: the drift is then the motion between their worlds.
+    pub merged_submaps: bool,
 }
 
 /// A stretch of frames over which the camera was lost.
@@ -52,8 +56,9 @@ impl PlaceTally {
     /// Takes account of a loop.
     pub fn close(&mut self, timestamp_ns: i64, closed: &LoopClosed) {
         let (drift_m, drift_deg) = (closed.drift.translation.vector.norm(), closed.drift.rotation.angle().to_degrees());
-        tracing::info!(inliers = closed.inliers, drift_m, drift_deg, "loop closed");
-        self.loops.push(Loop { timestamp_ns, inliers: closed.inliers, drift_m, drift_deg });
+        let LoopClosed { inliers, merged_submaps, .. } = *closed;
+        tracing::info!(inliers, drift_m, drift_deg, merged_submaps, "loop closed");
+        self.loops.push(Loop { timestamp_ns, inliers, drift_m, drift_deg, merged_submaps });
     }
 
     fn lost_or_found(&mut self, tracked: &Tracked) {

@@ -1,7 +1,8 @@
 //! What a loop changes in the map (ORB-SLAM, IEEE T-RO 2015, section VII): the near side moves to where the far side says it is,
-//! duplicates are joined, the error is spread over the way between them, and everything is adjusted.
+//! duplicates are joined, and the error is spread over the way between them. Where the old place is of another submap there is no
+//! such way: the whole submap moves, and the two become one.
 //!
-//! In: a keyframe located among the landmarks of an old place. Out: a corrected map.
+//! In: a keyframe located among the landmarks of an old place. Out: a corrected map, to be adjusted.
 
 use slotmap::SecondaryMap;
 
@@ -9,7 +10,7 @@ use super::recognise::Candidate;
 use crate::config::Config;
 use crate::geometry::Pose;
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::mapping::{Window, fuse};
+use crate::mapping::fuse;
 use crate::optimize::pose_graph::{Edge, PoseGraph};
 use crate::sensor::SensorModel;
 use crate::tracking::TrackedFrame;
@@ -37,14 +38,19 @@ pub fn close(
     candidate: &Candidate,
     located: &TrackedFrame,
 ) {
+    let Some(k) = map.keyframe(keyframe) else { return };
+    let t_far_near = located.t_cam_world.inverse() * k.t_cam_world;
+    let is_one_map = map.root(keyframe) == map.root(candidate.keyframe);
+    if !is_one_map {
+        map.weld(keyframe, candidate.keyframe, &t_far_near);
+    }
     let Some(mut ends) = Loop::new(map, keyframe, &located.t_cam_world) else { return };
     ends.move_near_side(map);
     ends.join(sensor, config, map, keyframe, candidate, located);
     map.add_loop_edge(keyframe, candidate.keyframe);
-    ends.spread(sensor, config, map);
-    let mut whole = Window::whole(sensor, map);
-    whole.adjust(&config.bundle);
-    whole.merge(sensor, map);
+    if is_one_map {
+        ends.spread(sensor, config, map, keyframe);
+    }
 }
 
 impl Loop {
@@ -91,10 +97,8 @@ impl Loop {
                 None => {}
             }
         }
-        let far_side = candidate.group.iter().filter(|id| !self.near.contains(id)).filter_map(|id| map.keyframe(*id));
-        let mut far: Vec<LandmarkId> = far_side.flat_map(|k| k.sights().map(|(_, l)| l)).collect();
-        far.sort_unstable();
-        far.dedup();
+        let far_side: Vec<KeyFrameId> = candidate.group.iter().filter(|id| !self.near.contains(id)).copied().collect();
+        let far = map.landmarks_of(&far_side);
         for &target in &self.near {
             fuse::fuse_into(sensor, config, map, target, &far);
         }
@@ -113,15 +117,19 @@ impl Loop {
     }
 
     /// Spreads the error over the essential graph: the spanning tree, all loops, and strong covisibility.
-    fn spread(&self, sensor: &SensorModel, config: &Config, map: &mut Map) {
-        // In the order of time the equations are nearly a band. The first keyframe, which defines the world, stays.
-        let mut order: Vec<(u64, KeyFrameId)> = map.keyframes().map(|(id, k)| (k.sequence, id)).collect();
+    fn spread(&self, sensor: &SensorModel, config: &Config, map: &mut Map, keyframe: KeyFrameId) {
+        let Some(root) = map.root(keyframe) else { return };
+        let members = map.submap(root);
+        // In the order of time the equations are nearly a band. The root, which defines the world, stays.
+        let mut order: Vec<(bool, u64, KeyFrameId)> =
+            members.iter().filter_map(|id| Some((*id != root, map.keyframe(*id)?.sequence, *id))).collect();
         order.sort_unstable();
-        let index: SecondaryMap<KeyFrameId, usize> = order.iter().enumerate().map(|(i, (_, id))| (*id, i)).collect();
+        let order: Vec<KeyFrameId> = order.into_iter().map(|(.., id)| id).collect();
+        let index: SecondaryMap<KeyFrameId, usize> = order.iter().enumerate().map(|(i, id)| (*id, i)).collect();
         let base = |id: KeyFrameId| self.moved.get(id).or(self.before.get(id)).copied();
         let is_link = |a, b| self.links.binary_search(&(a, b)).is_ok() || self.links.binary_search(&(b, a)).is_ok();
         let mut graph = PoseGraph::default();
-        for &(_, a) in &order {
+        for &a in &order {
             let (Some(keyframe), Some(pose)) = (map.keyframe(a), base(a)) else { continue };
             graph.poses.push(pose);
             let strong = keyframe.covisible.iter().filter(|(_, weight)| *weight >= config.loops.strong_weight);
@@ -139,8 +147,7 @@ impl Loop {
             }
         }
         graph.solve(&config.pose_graph);
-        let landmarks: Vec<LandmarkId> = map.landmarks().map(|(id, _)| id).collect();
-        for id in landmarks {
+        for id in map.landmarks_of(&members) {
             let Some(landmark) = map.landmark(id) else { continue };
             let anchor = self.carried.get(id).copied().unwrap_or(landmark.reference);
             let (Some(base), Some(&i)) = (base(anchor), index.get(anchor)) else { continue };
@@ -148,7 +155,7 @@ impl Loop {
             map.set_position(id, position);
             map.update_landmark(id, &sensor.scale_factors);
         }
-        for ((_, id), pose) in order.iter().zip(&graph.poses) {
+        for (id, pose) in order.iter().zip(&graph.poses) {
             map.set_pose(*id, *pose);
         }
     }

@@ -3,18 +3,21 @@
 //!
 //! ```text
 //! features ─► recognise ─► verify ─► correct
-//!             which place?  P3P       join, pose graph, bundle adjustment
+//!             which place?  P3P       join, pose graph ─► whole: bundle adjustment
 //! ```
 //!
 //! In: keyframes, and frames whose pose is unknown. Out: poses, and a map without the drift of a way that led back.
 
 mod correct;
 mod index;
+mod plausible;
 mod recognise;
 mod verify;
+mod whole;
 
 use std::sync::{Mutex, PoisonError};
 
+use nalgebra::Point3;
 use slotmap::SecondaryMap;
 
 use crate::config::Config;
@@ -25,6 +28,7 @@ use crate::tracking::{Sight, TrackedFrame};
 use recognise::Candidate;
 pub use recognise::Recogniser;
 use verify::Evidence;
+pub use whole::WholeAdjustment;
 
 /// A loop that was closed.
 #[derive(Clone, Copy, Debug)]
@@ -37,16 +41,39 @@ pub struct LoopClosed {
     pub inliers: usize,
     /// How the keyframe's estimate differed from the old place's: `t_estimated_located`, in the camera's frame.
     pub drift: Pose,
+    /// The motion between the two, as measured.
+    pub t_keyframe_to: Pose,
+    /// Whether the old place was of another submap, so that two became one: `drift` is then the motion between their worlds.
+    pub merged_submaps: bool,
+}
+
+/// Where a camera that is lost can be at most.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach {
+    /// The keyframe that it was last seen from.
+    pub reference: KeyFrameId,
+    /// Where it was then, in the world of that keyframe, m.
+    pub center_world: Point3<f64>,
+    /// How far it can have come since, m.
+    pub radius_m: f64,
+}
+
+impl Reach {
+    fn includes(&self, map: &Map, place: KeyFrameId, t_cam_world: &Pose) -> bool {
+        let center = t_cam_world.inverse_transform_point(&Point3::origin());
+        (center - self.center_world).norm() <= self.radius_m && map.root(place) == map.root(self.reference)
+    }
 }
 
 /// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then. Of several places that it may show
-/// the likeliest is taken.
+/// the likeliest is taken; one beyond `reach` has to be likelier still.
 pub fn relocalise(
     recogniser: &mut Recogniser,
     sensor: &SensorModel,
     config: &Config,
     map: &Map,
     frame: &mut TrackedFrame,
+    reach: Option<&Reach>,
 ) -> bool {
     let c = &config.places;
     let candidates = recogniser.candidates(c, map, &frame.features, |_| true);
@@ -54,6 +81,11 @@ pub fn relocalise(
     let mut best: Option<(f64, Pose, Vec<Option<Sight>>)> = None;
     for place in &candidates {
         let Some(evidence) = verify::locate(sensor, config, map, place, frame, &needed) else { continue };
+        let within = reach.is_some_and(|reach| reach.includes(map, place.keyframe, &frame.t_cam_world));
+        tracing::debug!(?evidence, within, "a place to be found at");
+        if !within && evidence.likeness < c.relocalise_min_likeness_beyond {
+            continue;
+        }
         if best.as_ref().is_none_or(|(likeness, ..)| evidence.likeness > *likeness) {
             best = Some((evidence.likeness, frame.t_cam_world, frame.sights.clone()));
         }
@@ -80,7 +112,7 @@ impl LoopCloser {
         self.last_loop = None;
     }
 
-    /// Looks whether a new keyframe shows an old place, and closes the loop if so.
+    /// Looks whether a new keyframe shows an old place, and closes the loop if so; the map is then to be adjusted as a whole.
     pub fn close(
         &mut self,
         sensor: &SensorModel,
@@ -99,14 +131,29 @@ impl LoopCloser {
         let candidates =
             old_places(&mut recogniser.lock().unwrap_or_else(PoisonError::into_inner), config, map, keyframe);
         for place in self.consistent_ones(config, candidates) {
-            let needed = Evidence { inliers: config.loops.min_inliers, likeness: config.loops.min_likeness };
+            let c = &config.loops;
+            let needed = Evidence { inliers: c.min_inliers, likeness: c.min_likeness };
             let found = verify::locate(sensor, config, map, &place, &mut self.frame, &needed);
-            let Some(Evidence { inliers, .. }) = found else { continue };
+            let Some(evidence) = found else { continue };
             let drift = estimated * self.frame.t_cam_world.inverse();
+            let plausible = plausible::is_plausible(c, map, keyframe, place.keyframe, &drift);
+            tracing::debug!(?evidence, %drift, plausible, "an old place");
+            if !plausible && evidence.likeness < c.min_likeness_of_jump {
+                continue;
+            }
+            let t_keyframe_to = self.frame.t_cam_world * map.keyframe(place.keyframe)?.t_cam_world.inverse();
+            let merged_submaps = map.root(keyframe) != map.root(place.keyframe);
             correct::close(sensor, config, map, keyframe, &place, &self.frame);
             self.last_loop = Some(sequence);
             self.consistent.clear();
-            return Some(LoopClosed { keyframe, to: place.keyframe, inliers, drift });
+            return Some(LoopClosed {
+                keyframe,
+                to: place.keyframe,
+                inliers: evidence.inliers,
+                drift,
+                t_keyframe_to,
+                merged_submaps,
+            });
         }
         None
     }

@@ -11,9 +11,10 @@ use super::recognise::Candidate;
 use crate::config::{Config, PlaceConfig};
 use crate::geometry::{Pose, p3p};
 use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
+use crate::optimize::pose_only::{self, PoseObservation};
 use crate::optimize::residual::Measurement;
 use crate::sensor::SensorModel;
-use crate::tracking::search::search_local_map;
+use crate::tracking::search::{Projector, search_local_map};
 use crate::tracking::{Sight, TrackedFrame};
 
 /// What speaks for a pose.
@@ -22,7 +23,7 @@ pub struct Evidence {
     /// Landmarks that fit it.
     pub inliers: usize,
     /// Landmarks that fit it and look the same, as a share of what tracking would find there, going by how often it found each of those
-    /// in view. Corridors are alike in their doors and lamps: there many landmarks fit, but more are missing.
+    /// in view and not behind what moves. Corridors are alike in their doors and lamps: there many landmarks fit, but more are missing.
     pub likeness: f64,
 }
 
@@ -34,7 +35,7 @@ impl Evidence {
 }
 
 /// Locates `frame` in the place of `candidate`. Pose and matches are then those of the frame. `None` if the evidence is less than
-/// `needed`.
+/// `needed`, or leaves open where the camera is.
 pub fn locate(
     sensor: &SensorModel,
     config: &Config,
@@ -63,15 +64,44 @@ pub fn locate(
         visible.extend(frame.sights.iter().flatten().filter_map(|sight| sight.landmark));
         visible.sort_unstable();
         visible.dedup();
-        expected = visible.iter().filter_map(|id| map.landmark(*id)).map(Landmark::found_ratio).sum();
+        let projector = Projector::new(sensor, &frame.t_cam_world);
+        let in_view = visible.iter().filter_map(|id| map.landmark(*id));
+        expected = in_view.filter(|l| !is_hidden(c, &projector, frame, l)).map(Landmark::found_ratio).sum();
         inliers = frame.refine_pose(sensor, &config.pose);
     }
+    let projector = Projector::new(sensor, &frame.t_cam_world);
     let alike = frame.sights.iter().zip(&frame.features.descriptors).filter(|(sight, seen)| {
         let landmark = sight.and_then(|s| map.landmark(s.landmark?));
-        landmark.is_some_and(|l| l.descriptor.distance(seen) <= c.max_distance)
+        landmark.is_some_and(|l| l.descriptor.distance(seen) <= c.max_distance && !is_hidden(c, &projector, frame, l))
     });
     let evidence = Evidence { inliers, likeness: alike.count() as f64 / expected.max(1.0) };
-    evidence.suffices(needed).then_some(evidence)
+    let is_fixed = position_sigma_m(sensor, frame) <= c.max_position_sigma_m;
+    (is_fixed && evidence.suffices(needed)).then_some(evidence)
+}
+
+/// How well the matches fix the camera's position, m.
+fn position_sigma_m(sensor: &SensorModel, frame: &TrackedFrame) -> f64 {
+    let matched =
+        frame.sights.iter().zip(&frame.features.features).filter_map(|(sight, feature)| Some(((*sight)?, feature)));
+    let observations: Vec<PoseObservation> = matched
+        .map(|(sight, feature)| PoseObservation {
+            point_world: sight.point_world,
+            measurement: sensor.measurement(feature),
+            trust: f64::from(feature.trust),
+            inlier: true,
+        })
+        .collect();
+    pose_only::position_sigma_m(&sensor.pinhole, &frame.t_cam_world, &observations)
+}
+
+/// Whether something that moves is where the landmark should be seen: it may stand in front of it.
+fn is_hidden(config: &PlaceConfig, projector: &Projector<'_>, frame: &TrackedFrame, landmark: &Landmark) -> bool {
+    let Some(projection) = projector.project(&landmark.position) else { return false };
+    let mut hidden = false;
+    frame.features.for_each_near(projection.u, projection.v, config.hidden_radius_px, 0..=u8::MAX, |j| {
+        hidden |= frame.features.features[j].trust <= 0.0;
+    });
+    hidden
 }
 
 /// Landmarks that the keyframes see and the frame is not matched to.

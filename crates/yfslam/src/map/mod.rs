@@ -1,11 +1,12 @@
 //! The map: keyframes and landmarks in two arenas with generational ids, and one owner.
 //!
-//! Invariants, kept by [`ops`], the only place that changes them:
+//! Invariants, kept by [`ops`] and `submap`, the only places that change them:
 //! 1. Landmark L lists keyframe K with feature i exactly if K's feature i lists L.
 //! 2. A landmark appears at most once in a keyframe.
 //! 3. A landmark has at least one observation.
 //! 4. The covisibility lists of two keyframes name each other with the same weight.
-//! 5. Every keyframe but the first has a parent in the map; parents form a tree.
+//! 5. Every keyframe but the first of a submap has a parent in the map; parents form a tree for each submap, and no landmark is seen
+//!    from two of them.
 //! 6. Loop edges are mutual; a keyframe with one stays in the map.
 
 mod keyframe;
@@ -13,6 +14,9 @@ mod landmark;
 pub mod ops;
 pub mod persist;
 mod restore;
+#[cfg(test)]
+pub(crate) mod scene;
+mod submap;
 
 use std::collections::BTreeMap;
 
@@ -22,7 +26,7 @@ use crate::geometry::Pose;
 pub use keyframe::{KeyFrame, KeyFrameId};
 pub use landmark::{Landmark, LandmarkId};
 
-/// Keyframes and landmarks of one session.
+/// Keyframes and landmarks, of one submap or several.
 #[derive(Clone, Debug, Default)]
 pub struct Map {
     keyframes: SlotMap<KeyFrameId, KeyFrame>,

@@ -1,6 +1,7 @@
 //! Every change of the map. Each operation leaves the invariants of [`crate::map`] standing and ignores ids that are gone.
 
 use nalgebra::{Point3, Vector3};
+use slotmap::SecondaryMap;
 
 use crate::features::FrameFeatures;
 use crate::geometry::Pose;
@@ -207,10 +208,11 @@ impl Map {
             let at = list.partition_point(|&(id, c)| (std::cmp::Reverse(c), id) < (std::cmp::Reverse(count), keyframe));
             list.insert(at, (keyframe, count));
         }
-        let parent = counts.first().map(|(id, _)| *id);
+        // The root of a submap has none: whom it sees hangs on it.
+        let parent = counts.first().map(|(id, _)| *id).filter(|parent| self.root(*parent) != Some(keyframe));
         let k = &mut self.keyframes[keyframe];
         k.covisible = counts;
-        if let (None, Some(parent), true) = (k.parent, parent, k.sequence > 0) {
+        if let (None, Some(parent)) = (k.parent, parent) {
             k.parent = Some(parent);
             self.keyframes[parent].children.push(keyframe);
         }
@@ -253,7 +255,18 @@ impl Map {
 
     /// Checks the invariants; an error names the first that is broken. For tests and for maps read from files.
     pub fn validate(&self) -> Result<(), String> {
+        let roots = self.keyframes.iter().filter(|(_, k)| k.parent.is_none()).map(|(id, _)| id);
+        let mut submap_of = SecondaryMap::new();
+        for root in roots {
+            submap_of.extend(self.submap(root).into_iter().map(|member| (member, root)));
+        }
+        if submap_of.len() != self.keyframes.len() {
+            return Err("a keyframe is its own ancestor".to_owned());
+        }
         for (id, l) in &self.landmarks {
+            if l.observations.windows(2).any(|pair| submap_of.get(pair[0].0) != submap_of.get(pair[1].0)) {
+                return Err(format!("landmark {id:?} is seen from two submaps"));
+            }
             if l.observations.is_empty() {
                 return Err(format!("landmark {id:?} has no observation"));
             }
@@ -281,6 +294,9 @@ impl Map {
             }
             if k.parent.is_some_and(|p| self.keyframes.get(p).is_none_or(|p| !p.children.contains(&id))) {
                 return Err(format!("the parent of {id:?} does not list it as a child"));
+            }
+            if k.children.iter().any(|c| self.keyframes.get(*c).is_none_or(|c| c.parent != Some(id))) {
+                return Err(format!("a child of {id:?} does not name it as its parent"));
             }
         }
         Ok(())

@@ -30,11 +30,10 @@ impl Map {
         Ok(())
     }
 
-    /// The parent of a keyframe in the spanning tree, which is older: so nobody is its own ancestor.
+    /// The parent of a keyframe in the spanning tree, which is none of its descendants.
     pub(super) fn restore_parent(&mut self, child: KeyFrameId, parent: KeyFrameId) -> Result<(), String> {
-        let (young, old) = (self.keyframes[child].sequence, self.keyframes[parent].sequence);
-        if young <= old {
-            return Err(format!("keyframe {young} has the younger keyframe {old} as its parent"));
+        if self.root(parent) == Some(child) || self.keyframes[child].parent.is_some() {
+            return Err(format!("keyframe {} is its own ancestor", self.keyframes[child].sequence));
         }
         self.keyframes[child].parent = Some(parent);
         self.keyframes[parent].children.push(child);

@@ -22,8 +22,8 @@ impl Window {
         let center = map.keyframe(keyframe)?;
         let mut keyframes = vec![keyframe];
         keyframes.extend(center.covisible.iter().take(config.window_keyframes.saturating_sub(1)).map(|(id, _)| *id));
-        // The first keyframe defines the world: it is never adjusted.
-        keyframes.retain(|id| map.keyframe(*id).is_some_and(|k| k.sequence > 0));
+        // The root defines the world: it is never adjusted.
+        keyframes.retain(|id| map.keyframe(*id).is_some_and(|k| k.parent.is_some()));
         let mut landmarks: Vec<LandmarkId> =
             keyframes.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.sights().map(|(_, l)| l)).collect();
         landmarks.sort_unstable();
@@ -41,16 +41,27 @@ impl Window {
         Some(Self::assemble(sensor, map, keyframes, free_poses, landmarks))
     }
 
-    /// Copies the whole map; all keyframes but the first are adjusted.
-    pub fn whole(sensor: &SensorModel, map: &Map) -> Self {
-        // In the order of time, in which the equations are nearly a band; the first keyframe, which stays, goes last.
-        let mut keyframes: Vec<(u64, KeyFrameId)> =
-            map.keyframes().map(|(id, k)| (k.sequence.wrapping_sub(1), id)).collect();
+    /// Copies the whole submap with that root; all keyframes but the root are adjusted.
+    pub fn whole(sensor: &SensorModel, map: &Map, root: KeyFrameId) -> Self {
+        let members = map.submap(root);
+        let landmarks = map.landmarks_of(&members);
+        // In the order of time, in which the equations are nearly a band; the root, which stays, goes last.
+        let mut keyframes: Vec<(bool, u64, KeyFrameId)> =
+            members.iter().filter_map(|id| Some((*id == root, map.keyframe(*id)?.sequence, *id))).collect();
         keyframes.sort_unstable();
-        let free_poses = keyframes.iter().filter(|(order, _)| *order < u64::MAX).count();
-        let keyframes = keyframes.into_iter().map(|(_, id)| id).collect();
-        let landmarks = map.landmarks().map(|(id, _)| id).collect();
+        let free_poses = keyframes.len().saturating_sub(1);
+        let keyframes = keyframes.into_iter().map(|(.., id)| id).collect();
         Self::assemble(sensor, map, keyframes, free_poses, landmarks)
+    }
+
+    /// The keyframes that were copied.
+    pub fn keyframes(&self) -> &[KeyFrameId] {
+        &self.keyframes
+    }
+
+    /// The landmarks that were copied, in the order of their ids.
+    pub fn landmarks(&self) -> &[LandmarkId] {
+        &self.landmarks
     }
 
     fn assemble(
@@ -84,9 +95,14 @@ impl Window {
 
     /// Adjusts the copy: a few robust steps, outliers out, then more steps.
     pub fn adjust(&mut self, config: &BundleConfig) -> BundleSummary {
-        let first = self.problem.solve(config, config.first_iterations, true);
+        self.adjust_while(config, &|| true)
+    }
+
+    /// As [`Window::adjust`], until `go_on` says no, which is asked before each step.
+    pub fn adjust_while(&mut self, config: &BundleConfig, go_on: &dyn Fn() -> bool) -> BundleSummary {
+        let first = self.problem.solve_while(config, config.first_iterations, true, go_on);
         self.problem.drop_outliers();
-        let second = self.problem.solve(config, config.second_iterations, false);
+        let second = self.problem.solve_while(config, config.second_iterations, false, go_on);
         self.problem.drop_outliers();
         BundleSummary { iterations: first.iterations + second.iterations, ..second }
     }

@@ -46,6 +46,15 @@ pub fn optimize_pose(
     inliers
 }
 
+/// Standard deviation of the camera's position at `t_cam_world`, m, as far as the noise of the inliers tells; infinite where they leave
+/// it open.
+pub fn position_sigma_m(camera: &Pinhole, t_cam_world: &Pose, observations: &[PoseObservation]) -> f64 {
+    let (h, ..) = linearise(camera, false, t_cam_world, observations);
+    // A left perturbation moves the camera by its translation part.
+    let covariance = h.try_inverse().map(|inverse| inverse.fixed_view::<3, 3>(0, 0).trace());
+    covariance.filter(|variance| *variance >= 0.0).map_or(f64::INFINITY, f64::sqrt)
+}
+
 /// Levenberg–Marquardt over the six parameters of a left perturbation.
 fn minimise(
     camera: &Pinhole,
@@ -192,6 +201,24 @@ mod tests {
         let error = pose * truth.inverse();
         assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle() < 1e-6, "{error}");
         assert_eq!(inliers, 50);
+    }
+
+    #[test]
+    fn the_position_is_the_less_certain_the_farther_and_fewer_the_points() {
+        let camera = Pinhole { fx: 520.0, fy: 510.0, cx: 320.0, cy: 240.0, bf: 40.0 };
+        let pose = Pose::translation(0.1, 0.0, 0.2);
+        let near = observations(&camera, &pose);
+        let sigma = |observations: &[PoseObservation]| position_sigma_m(&camera, &pose, observations);
+        let far: Vec<_> = near
+            .iter()
+            .map(|o| {
+                let p = pose * o.point_world;
+                PoseObservation { point_world: pose.inverse() * Point3::from(p.coords * 4.0), ..*o }
+            })
+            .collect();
+        assert!(sigma(&near) < 0.02 && sigma(&far) > 2.0 * sigma(&near), "{} {}", sigma(&near), sigma(&far));
+        assert!(sigma(&near[..20]) > 1.5 * sigma(&near));
+        assert!(sigma(&near[..1]) > 0.3 && sigma(&[]).is_infinite());
     }
 
     #[test]

@@ -56,6 +56,17 @@ pub struct BundleSummary {
 impl BundleProblem {
     /// Minimises the robust cost by at most `iterations` steps; poses and points are updated in place.
     pub fn solve(&mut self, config: &BundleConfig, iterations: usize, robust: bool) -> BundleSummary {
+        self.solve_while(config, iterations, robust, &|| true)
+    }
+
+    /// As [`BundleProblem::solve`], until `go_on` says no, which is asked before each step.
+    pub fn solve_while(
+        &mut self,
+        config: &BundleConfig,
+        iterations: usize,
+        robust: bool,
+        go_on: &dyn Fn() -> bool,
+    ) -> BundleSummary {
         debug_assert!(self.observations.is_sorted_by_key(|o| o.point));
         let mut system = NormalEquations::new(self);
         let mut cost = self.cost(robust);
@@ -63,6 +74,9 @@ impl BundleProblem {
         let mut lambda = config.initial_damping;
         let mut stale = true;
         for _ in 0..iterations {
+            if !go_on() {
+                break;
+            }
             if stale {
                 system.linearise(self, robust);
                 stale = false;

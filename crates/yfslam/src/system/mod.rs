@@ -1,22 +1,25 @@
 //! The whole path from a frame to its pose, on one page.
 
 mod errors;
+mod results;
 
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
+
+use nalgebra::Point3;
 
 use crate::backend::{Backend, Execution, Inserted, MapOwner};
 use crate::camera::Camera;
 use crate::config::Config;
 use crate::detection::{Detection, Detector};
 use crate::detector_thread::DetectorThread;
-use crate::dynamic::{Door, DynamicFilter, Evidence, Method, Region};
+use crate::dynamic::{Door, DynamicFilter, Evidence, Method};
 use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
 use crate::image::{GrayImage, gray_from_rgb};
-use crate::loops::{LoopClosed, relocalise};
-use crate::map::persist::{MapError, SavedMap, encode};
+use crate::loops::{LoopClosed, Reach, relocalise};
+use crate::map::persist::SavedMap;
 use crate::map::{KeyFrameId, Map};
 use crate::sensor::SensorModel;
 use crate::tracking::{TrackedFrame, Tracker, TrackingState};
@@ -95,8 +98,8 @@ pub struct Slam {
     detector_failures: usize,
     last_timestamp_ns: Option<i64>,
     resets: usize,
-    /// Time of the last frame that was tracked, ns.
-    last_tracked_ns: Option<i64>,
+    /// Frames since the camera was lost that showed enough for a map and were not recognised.
+    unknown_frames: usize,
     /// Frames that were worth keeping when mapping was busy.
     passed_over: usize,
     /// How a map from an earlier session is used; `None` if the map is all of this one.
@@ -138,7 +141,7 @@ impl Slam {
             detector_failures: 0,
             last_timestamp_ns: None,
             resets: 0,
-            last_tracked_ns: None,
+            unknown_frames: 0,
             passed_over: 0,
             map_use: None,
             first_keyframe: 0,
@@ -219,7 +222,7 @@ impl Slam {
             loop_closed = times.note(&inserted);
         }
         let tracked = match self.state {
-            TrackingState::NotInitialized => self.has_enough_to_start(),
+            TrackingState::NotInitialized => self.owner.is_free() && self.has_enough_to_start(),
             TrackingState::Tracking => {
                 let min_inliers = self.config.tracking.local_min_inliers;
                 let map = self.owner.map();
@@ -241,6 +244,9 @@ impl Slam {
         if tracked {
             self.tracker.accept(self.owner.map());
             self.filter.end_frame(&self.config.dynamic, frame.timestamp_ns, self.tracker.current.reference);
+            if self.state != TrackingState::Tracking {
+                self.tracker.forget_motion();
+            }
         } else {
             self.tracker.reject();
         }
@@ -248,7 +254,8 @@ impl Slam {
         let is_keyframe = tracked && self.wants_keyframe();
         if is_keyframe {
             self.tracker.offered_keyframe();
-            if let Some(inserted) = self.owner.insert(&self.tracker.current, &frame.color) {
+            let is_first = self.state == TrackingState::NotInitialized;
+            if let Some(inserted) = self.owner.insert(&self.tracker.current, &frame.color, is_first) {
                 self.tracker.became_keyframe(inserted.keyframe, self.owner.map());
                 loop_closed = times.note(&inserted);
             }
@@ -256,11 +263,11 @@ impl Slam {
         self.state = match (tracked, self.state) {
             (true, _) => TrackingState::Tracking,
             (false, TrackingState::NotInitialized) => TrackingState::NotInitialized,
-            (false, _) if self.is_map_worthless(frame.timestamp_ns) => self.reset(),
+            (false, _) if self.is_elsewhere() => self.begin_submap(),
             (false, _) => TrackingState::Lost,
         };
         if tracked {
-            self.last_tracked_ns = Some(frame.timestamp_ns);
+            self.unknown_frames = 0;
         }
         self.note_anchor(frame.timestamp_ns);
         Ok(Tracked {
@@ -351,9 +358,22 @@ impl Slam {
 
     /// Seeks the frame of a camera that was lost in the whole map.
     fn find_again(&mut self) -> bool {
+        let reach = self.reach();
         let recogniser = self.owner.recogniser();
         let mut recogniser = recogniser.lock().unwrap_or_else(PoisonError::into_inner);
-        relocalise(&mut recogniser, &self.sensor, &self.config, self.owner.map(), &mut self.tracker.current)
+        let map = self.owner.map();
+        relocalise(&mut recogniser, &self.sensor, &self.config, map, &mut self.tracker.current, reach.as_ref())
+    }
+
+    /// Where the camera can have come since it was lost; `None` after too long a time, or if it never was tracked.
+    fn reach(&self) -> Option<Reach> {
+        let c = &self.config.places;
+        let last = self.anchors.last()?;
+        let lost_s = self.tracker.current.timestamp_ns.saturating_sub(last.timestamp_ns) as f64 * 1e-9;
+        let t_cam_world = last.t_cam_reference * self.owner.map().keyframe_pose(last.reference)?;
+        let center_world = t_cam_world.inverse_transform_point(&Point3::origin());
+        let reach = Reach { reference: last.reference, center_world, radius_m: c.max_speed_m_per_s * (lost_s + 1.0) };
+        (lost_s <= c.max_reach_s).then_some(reach)
     }
 
     /// Whether the frame is to become a keyframe, and can.
@@ -367,25 +387,38 @@ impl Slam {
         free
     }
 
-    /// Whether a fresh start is worth more than the map (ORB-SLAM2): it is young, all of this session, and nothing in it was recognised
-    /// for a while.
-    fn is_map_worthless(&self, now_ns: i64) -> bool {
-        let c = &self.config.tracking;
-        let lost_s = self.last_tracked_ns.map_or(f64::INFINITY, |then| now_ns.saturating_sub(then) as f64 * 1e-9);
-        self.map_use.is_none() && self.owner.map().keyframe_count() <= c.reset_max_keyframes && lost_s > c.reset_after_s
+    /// Whether the camera has seen enough for a map for a while, and nothing in it was recognised. Time in which there was nothing to
+    /// see does not count.
+    fn is_elsewhere(&mut self) -> bool {
+        if self.map_use == Some(MapUse::Localise) {
+            return false;
+        }
+        self.unknown_frames += usize::from(self.has_enough_to_start());
+        self.unknown_frames as f64 > self.config.tracking.reset_after_s * self.sensor.camera.fps
     }
 
-    /// Throws the map away and starts over with the next frame. The poses that hung on it go with it.
-    fn reset(&mut self) -> TrackingState {
-        tracing::warn!(
-            keyframes = self.owner.map().keyframe_count(),
-            "lost soon after the start: the map is begun anew"
-        );
-        self.owner.reset();
-        self.anchors.clear();
-        self.last_tracked_ns = None;
+    /// Begins a submap with the next frame, in a world that continues where the camera was lost. The old one stays, to be recognised
+    /// and joined, unless it is so young that a fresh start is worth more (ORB-SLAM2): then the poses that hung on it go with it.
+    fn begin_submap(&mut self) -> TrackingState {
+        self.unknown_frames = 0;
+        let map = self.owner.map();
+        // What an earlier session left is kept in any case.
+        let is_own = |root: &KeyFrameId| map.keyframe(*root).is_some_and(|k| k.sequence >= self.first_keyframe);
+        let root = self.tracker.reference().and_then(|reference| map.root(reference)).filter(is_own);
+        let young = self.config.tracking.reset_max_keyframes;
+        let keyframes = root.map_or(0, |root| map.submap_size(root, young + 1));
+        if map.keyframe_count() <= young && self.map_use.is_none() {
+            tracing::warn!(keyframes, "lost soon after the start: the map is begun anew");
+            self.owner.reset();
+            self.anchors.clear();
+            self.resets += 1;
+        } else {
+            tracing::warn!(keyframes, "nothing was recognised: a new submap is begun");
+            if let Some(root) = root.filter(|_| keyframes <= young) {
+                self.owner.forget(root);
+            }
+        }
         self.tracker.reset();
-        self.resets += 1;
         TrackingState::NotInitialized
     }
 
@@ -395,71 +428,6 @@ impl Slam {
         {
             self.anchors.push(Anchor { timestamp_ns, reference, t_cam_reference });
         }
-    }
-
-    /// Waits for mapping that is under way on its own thread, so that [`Slam::map`] and [`Slam::trajectory`] tell all. Returns the loop
-    /// that it closed.
-    pub fn settle(&mut self) -> Option<LoopClosed> {
-        self.owner.settle()?.loop_closed
-    }
-
-    /// Frames that were worth a keyframe while mapping was busy on its own thread.
-    pub fn passed_over(&self) -> usize {
-        self.passed_over
-    }
-
-    /// Poses of all tracked frames (world from camera) as the map has them now.
-    pub fn trajectory(&self) -> Vec<(i64, Pose)> {
-        self.anchors
-            .iter()
-            .filter_map(|a| {
-                let t_cam_world = a.t_cam_reference * self.owner.map().keyframe_pose(a.reference)?;
-                Some((a.timestamp_ns, t_cam_world.inverse()))
-            })
-            .collect()
-    }
-
-    /// How often the map was begun anew because tracking was lost soon after the start. Poses given out before belong to another world.
-    pub fn resets(&self) -> usize {
-        self.resets
-    }
-
-    /// Frames on which the detector failed.
-    pub fn detector_failures(&self) -> usize {
-        self.detector_failures
-    }
-
-    /// The last frame: features with their trust, matches, pose.
-    pub fn last_frame(&self) -> &TrackedFrame {
-        &self.tracker.current
-    }
-
-    /// The boxes of movable objects in the last frame, at any score.
-    pub fn last_boxes(&self) -> &[Detection] {
-        &self.movable
-    }
-
-    /// The parts of the last frame that were found to move.
-    pub fn moving_regions(&self) -> &[Region] {
-        self.filter.regions()
-    }
-
-    /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
-    pub fn first_keyframe(&self) -> u64 {
-        self.first_keyframe
-    }
-
-    /// The map as bytes, for [`crate::map::persist::decode`].
-    ///
-    /// # Errors
-    /// If it cannot be written, which would be a fault of this program.
-    pub fn save_map(&self) -> Result<Vec<u8>, MapError> {
-        encode(self.map(), &self.sensor.camera, &self.config.features)
-    }
-
-    /// The map: with mapping on its own thread, as it was after the last keyframe that is finished.
-    pub fn map(&self) -> &Map {
-        self.owner.map()
     }
 }
 

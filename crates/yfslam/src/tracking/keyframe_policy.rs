@@ -26,7 +26,8 @@ pub fn is_keyframe_wanted(
     frame: &TrackedFrame,
     summary: FrameSummary,
 ) -> bool {
-    let few = map.keyframe_count() <= 2;
+    let known = map.submap_size(reference, 3);
+    let few = known <= 2;
     let min_weight = if few { config.min_observation_weight - 1 } else { config.min_observation_weight };
     let reference_landmarks = map.keyframe(reference).map_or(0, |k| {
         k.sights().filter_map(|(_, l)| map.landmark(l)).filter(|l| map.observation_weight(l) >= min_weight).count()
@@ -38,7 +39,7 @@ pub fn is_keyframe_wanted(
         }
     }
     let need_close = close_tracked < config.close_tracked && close_untracked > config.close_untracked;
-    let ratio = if map.keyframe_count() < 2 { config.first_reference_ratio } else { config.reference_ratio };
+    let ratio = if known < 2 { config.first_reference_ratio } else { config.reference_ratio };
     let weak = (summary.inliers as f64) < reference_landmarks as f64 * ratio;
     let urgent = (summary.inliers as f64) < reference_landmarks as f64 * config.urgent_ratio || need_close;
     if summary.frames_since < config.min_frames && !urgent {

@@ -151,6 +151,11 @@ impl Tracker {
         }
     }
 
+    /// Forgets the motion: the last frame's pose is not one to measure it from.
+    pub fn forget_motion(&mut self) {
+        self.velocity = None;
+    }
+
     /// Ends a frame that could not be tracked: its pose stays that of the last one.
     pub fn reject(&mut self) {
         self.velocity = None;
@@ -188,6 +193,11 @@ impl Tracker {
             *sight =
                 landmark.and_then(|id| Some(Sight { landmark: Some(id), point_world: map.landmark(id)?.position }));
         }
+    }
+
+    /// The keyframe that the last tracked frame shares most with.
+    pub fn reference(&self) -> Option<KeyFrameId> {
+        self.reference
     }
 
     /// Forgets everything but its buffers, as after a start.

@@ -4,18 +4,19 @@
 //! the same frames give the same bits. [`Execution::Threaded`] does it beside tracking, which reads the map as it was after the last
 //! finished keyframe; while one is under way no other is taken, so no queue grows. Both run the same [`Backend`].
 
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+mod thread;
+
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::config::Config;
 use crate::image::RgbImage;
-use crate::loops::{LoopClosed, LoopCloser, Recogniser};
+use crate::loops::{LoopClosed, LoopCloser, Recogniser, WholeAdjustment};
 use crate::map::{KeyFrameId, Map};
 use crate::mapping::Mapper;
 use crate::sensor::SensorModel;
 use crate::tracking::{Sightings, TrackedFrame};
+pub use thread::BackendThread;
 
 /// Where mapping and loop closing run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,7 +68,7 @@ impl Backend {
         Arc::clone(&self.recogniser)
     }
 
-    /// Takes a frame into the map.
+    /// Takes a frame into the map. If that closes a loop, the map is left to be adjusted as a whole.
     fn insert(&mut self, frame: &TrackedFrame, color: &RgbImage) -> Inserted {
         let started = Instant::now();
         let keyframe = self.mapper.insert(&self.sensor, &self.config, &mut self.map, frame, color);
@@ -79,6 +80,14 @@ impl Backend {
             loop_closed = self.loops.close(&self.sensor, &self.config, &self.recogniser, &mut self.map, keyframe);
         }
         Inserted { keyframe, loop_closed, mapping, places: started.elapsed() - mapping }
+    }
+
+    /// Adjusts the whole submap of a keyframe.
+    fn adjust_whole(&mut self, keyframe: KeyFrameId) {
+        if let Some(mut whole) = WholeAdjustment::copy(&self.sensor, &self.map, keyframe) {
+            whole.adjust(&self.config.bundle, &|| true);
+            whole.merge(&self.sensor, &mut self.map);
+        }
     }
 
     fn note(&mut self, sightings: &Sightings) {
@@ -139,14 +148,22 @@ impl MapOwner {
         }
     }
 
-    /// Hands a keyframe over. What became of it, if that is known at once.
-    pub fn insert(&mut self, frame: &TrackedFrame, color: &Arc<RgbImage>) -> Option<Inserted> {
+    /// Hands a keyframe over. What became of it, if that is known at once. The first of a submap is waited for: without it nothing can
+    /// be tracked there.
+    pub fn insert(&mut self, frame: &TrackedFrame, color: &Arc<RgbImage>, is_first: bool) -> Option<Inserted> {
         match self {
-            Self::Inline(backend) => Some(backend.insert(frame, color)),
+            Self::Inline(backend) => {
+                let mut inserted = backend.insert(frame, color);
+                if inserted.loop_closed.is_some() {
+                    let started = Instant::now();
+                    backend.adjust_whole(inserted.keyframe);
+                    inserted.places += started.elapsed();
+                }
+                Some(inserted)
+            }
             Self::Threaded(thread) => {
                 thread.insert(frame, color);
-                // Nothing can be tracked in an empty map: the first keyframe is waited for.
-                if thread.snapshot.keyframe_count() == 0 { thread.wait() } else { None }
+                if is_first { thread.wait() } else { None }
             }
         }
     }
@@ -159,11 +176,11 @@ impl MapOwner {
         }
     }
 
-    /// Waits until every keyframe handed over is in the map.
+    /// Waits until every keyframe handed over is in the map, and the map adjusted after the last loop.
     pub fn settle(&mut self) -> Option<Inserted> {
         match self {
             Self::Inline(_) => None,
-            Self::Threaded(thread) => thread.wait(),
+            Self::Threaded(thread) => thread.settle(),
         }
     }
 
@@ -178,129 +195,27 @@ impl MapOwner {
         }
     }
 
+    /// Whether the map can still grow: false once a thread of its own has ended by a panic.
+    pub fn is_alive(&self) -> bool {
+        match self {
+            Self::Inline(_) => true,
+            Self::Threaded(thread) => thread.is_alive(),
+        }
+    }
+
+    /// Gives the submap with that root up.
+    pub fn forget(&mut self, root: KeyFrameId) {
+        match self {
+            Self::Inline(backend) => backend.map.remove_submap(root),
+            Self::Threaded(thread) => thread.forget(root),
+        }
+    }
+
     /// Begins anew with an empty map.
     pub fn reset(&mut self) {
         match self {
             Self::Inline(backend) => backend.reset(),
             Self::Threaded(thread) => thread.reset(),
-        }
-    }
-}
-
-enum Request {
-    Insert(Box<TrackedFrame>, Arc<RgbImage>),
-    Note(Sightings),
-    Reset,
-}
-
-/// A backend on a thread of its own.
-pub struct BackendThread {
-    /// `None` once the thread was told to end.
-    requests: Option<SyncSender<Request>>,
-    answers: Receiver<(Arc<Map>, Inserted)>,
-    thread: Option<JoinHandle<()>>,
-    recogniser: Arc<Mutex<Recogniser>>,
-    snapshot: Arc<Map>,
-    busy: bool,
-}
-
-/// Requests that wait: a keyframe, and a few counts of sightings.
-const QUEUE: usize = 4;
-
-impl BackendThread {
-    fn spawn(mut backend: Backend) -> std::io::Result<Self> {
-        let (requests, inbox) = sync_channel(QUEUE);
-        // One keyframe is under way at most: its answer always finds room.
-        let (outbox, answers) = sync_channel(1);
-        let (recogniser, snapshot) = (backend.recogniser(), Arc::new(backend.map.clone()));
-        let work = move || {
-            for request in inbox {
-                match request {
-                    Request::Insert(mut frame, color) => {
-                        // The map may have moved since the frame was tracked in a snapshot of it.
-                        frame.follow_map(&backend.map);
-                        let inserted = backend.insert(&frame, &color);
-                        if outbox.send((Arc::new(backend.map.clone()), inserted)).is_err() {
-                            return;
-                        }
-                    }
-                    Request::Note(sightings) => backend.note(&sightings),
-                    Request::Reset => backend.reset(),
-                }
-            }
-        };
-        let thread = std::thread::Builder::new().name("mapping".to_owned()).spawn(work)?;
-        Ok(Self { requests: Some(requests), answers, thread: Some(thread), recogniser, snapshot, busy: false })
-    }
-
-    fn insert(&mut self, frame: &TrackedFrame, color: &Arc<RgbImage>) {
-        self.busy = true;
-        self.send(Request::Insert(Box::new(frame.clone()), Arc::clone(color)));
-    }
-
-    fn send(&mut self, request: Request) {
-        let sent = self.requests.as_ref().is_some_and(|requests| requests.send(request).is_ok());
-        if !sent {
-            // The thread has ended by a panic, which it reported; what is mapped stays usable.
-            self.requests = None;
-        }
-    }
-
-    fn poll(&mut self) -> Option<Inserted> {
-        match self.answers.try_recv() {
-            Ok(answer) => Some(self.adopt(answer)),
-            Err(TryRecvError::Empty) => None,
-            Err(TryRecvError::Disconnected) => {
-                if self.requests.take().is_some() {
-                    tracing::error!("the mapping thread has ended by a panic: the map no longer grows");
-                }
-                // No more keyframes are handed over; they count as passed over.
-                self.busy = true;
-                None
-            }
-        }
-    }
-
-    fn wait(&mut self) -> Option<Inserted> {
-        if !self.busy {
-            return None;
-        }
-        let answer = self.answers.recv().ok()?;
-        Some(self.adopt(answer))
-    }
-
-    fn adopt(&mut self, (map, inserted): (Arc<Map>, Inserted)) -> Inserted {
-        self.snapshot = map;
-        self.busy = false;
-        inserted
-    }
-
-    fn note(&mut self, sightings: &mut Sightings) {
-        // Counts are not urgent: if the queue is full they wait for the next frame.
-        if let Some(requests) = self.requests.as_ref().filter(|_| sightings.visible.len() >= NOTE_AT)
-            && let Err(error) = requests.try_send(Request::Note(std::mem::take(sightings)))
-            && let std::sync::mpsc::TrySendError::Full(Request::Note(back)) = error
-        {
-            *sightings = back;
-        }
-    }
-
-    fn reset(&mut self) {
-        self.wait();
-        self.send(Request::Reset);
-        self.snapshot = Arc::default();
-    }
-}
-
-/// Sightings that are sent together.
-const NOTE_AT: usize = 4000;
-
-impl Drop for BackendThread {
-    fn drop(&mut self) {
-        self.requests = None;
-        if let Some(thread) = self.thread.take() {
-            // A panic was reported by the thread already.
-            let _ = thread.join();
         }
     }
 }

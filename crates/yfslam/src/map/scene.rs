@@ -1,0 +1,89 @@
+//! A small world with exact measurements, for tests of what changes the map.
+
+use nalgebra::{Point3, Vector6};
+
+use super::{KeyFrameId, Map};
+use crate::camera::Camera;
+use crate::config::Config;
+use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds};
+use crate::geometry::{Pose, se3_exp};
+use crate::sensor::SensorModel;
+
+/// Points on a wavy wall, and the cameras that pass it.
+pub struct Scene {
+    pub sensor: SensorModel,
+    points: Vec<Point3<f64>>,
+}
+
+/// The camera of the scene.
+pub fn camera() -> Camera {
+    Camera {
+        width: 640,
+        height: 480,
+        fx: 520.0,
+        fy: 510.0,
+        cx: 320.0,
+        cy: 240.0,
+        distortion: [0.0; 5],
+        depth_factor: 5000.0,
+        fps: 30.0,
+        bf: 40.0,
+    }
+}
+
+impl Scene {
+    pub fn new() -> Self {
+        let camera = camera();
+        let point = |i: usize| {
+            let (x, y) = (0.05 * i as f64 - 1.5, 0.3 * ((i * 7 % 11) as f64 - 5.0) * 0.5);
+            Point3::new(x, y, 3.0 + 0.4 * ((i * 5 % 9) as f64 / 9.0))
+        };
+        let sensor = SensorModel::new(&camera, &Config::default(), &[1.0]);
+        Self { sensor, points: (0..160).map(point).collect() }
+    }
+
+    /// True pose `t_cam_world` of camera `k`.
+    pub fn pose(&self, k: usize) -> Pose {
+        se3_exp(&(Vector6::new(-0.15, 0.01, 0.02, 0.0, 0.01, 0.002) * k as f64))
+    }
+
+    /// Adds camera `k` at `believed` (`t_cam_world`) with landmarks where it believes them, unless `shared` has them already.
+    pub fn add(&self, map: &mut Map, k: usize, believed: &Pose, shared: &[KeyFrameId]) -> KeyFrameId {
+        let pose = self.pose(k);
+        let c = &self.sensor.pinhole;
+        let mut seen = Vec::new();
+        let (mut features, mut descriptors) = (Vec::new(), Vec::new());
+        for (number, point) in self.points.iter().enumerate() {
+            let p = pose * point;
+            let [u, v] = c.project(&p.coords);
+            if !(0.0..640.0).contains(&u) || !(0.0..480.0).contains(&v) {
+                continue;
+            }
+            let [u, v] = [u as f32, v as f32];
+            let depth_m = Some(p.z as f32);
+            features.push(Feature { raw: [u, v], u, v, octave: 0, angle_rad: 0.0, depth_m, trust: 1.0 });
+            descriptors.push(Descriptor([number as u64; 4].map(|n| n.wrapping_mul(0x9e37_79b9_7f4a_7c15))));
+            seen.push(number);
+        }
+        let bounds = ImageBounds { u_min: 0.0, u_max: 640.0, v_min: 0.0, v_max: 480.0 };
+        let descriptors_of = descriptors.clone();
+        let id = map.insert_keyframe(k as i64, *believed, FrameFeatures::from_parts(features, descriptors, bounds));
+        for (feature, number) in seen.iter().enumerate() {
+            let known = shared.iter().filter_map(|other| map.keyframe(*other)).find_map(|other| {
+                let same = |(i, landmark): (usize, _)| {
+                    (other.features.descriptors[i] == descriptors_of[feature]).then_some(landmark)
+                };
+                other.sights().find_map(same)
+            });
+            match known {
+                Some(landmark) => map.add_observation(landmark, id, feature),
+                None => {
+                    let position = believed.inverse() * (pose * self.points[*number]);
+                    map.insert_landmark(position, id, feature, [0; 3], &self.sensor.scale_factors);
+                }
+            }
+        }
+        map.update_covisibility(id);
+        id
+    }
+}
