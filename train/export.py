@@ -2,6 +2,7 @@
 
     python -m train.export RUN/final.pt person.onnx           # float32
     python -m train.export RUN/final.pt person.onnx --half    # weights stored as float16: half the size
+    python -m train.export RUN/final.pt person.onnx --as-0.3 0.45   # what scored 0.45 scores 0.3, the SLAM's threshold
 """
 
 import argparse
@@ -55,8 +56,16 @@ def halve(graph):
     graph.node.extend(casts + nodes)
 
 
-def write(checkpoint, out, half):
+def shift(model, score):
+    """Shifts objectness so that `score` becomes 0.3: the order of detections, and AP with it, stays."""
+    logit = lambda p: np.log(p / (1 - p))
+    with torch.no_grad():
+        model.obj.bias += float(logit(0.3) - logit(score))
+
+
+def write(checkpoint, out, half, score=0.3):
     model, config = load(checkpoint)
+    shift(model, score)
     torch.onnx.export(fold(model), (torch.zeros(1, 3, SIDE, SIDE),), out, input_names=["input"], output_names=NAMES, opset_version=13,
                       dynamo=False)
     exported = onnx.load(out)
@@ -74,8 +83,9 @@ def main():
     parser.add_argument("checkpoint", type=pathlib.Path)
     parser.add_argument("onnx", type=pathlib.Path)
     parser.add_argument("--half", action="store_true", help="store the weights as float16")
+    parser.add_argument("--as-0.3", dest="score", type=float, default=0.3, help="the score that is to become 0.3 (0.3)")
     options = parser.parse_args()
-    write(options.checkpoint, options.onnx, options.half)
+    write(options.checkpoint, options.onnx, options.half, options.score)
 
 
 if __name__ == "__main__":
