@@ -62,9 +62,14 @@ pub fn of_one(report: &Report, run: &Run) -> Result<String> {
 }
 
 fn places_summary(text: &mut String, places: &PlaceTally) -> Result<()> {
-    if !places.loops.is_empty() {
-        let drifts: Vec<_> = places.loops.iter().map(|l| format!("{:.2} m", l.drift_m)).collect();
-        writeln!(text, "loops closed: {}, after a drift of {}", places.loops.len(), drifts.join(", "))?;
+    let joins = places.loops.iter().filter(|l| l.merged_submaps).count();
+    let drifts: Vec<_> =
+        places.loops.iter().filter(|l| !l.merged_submaps).map(|l| format!("{:.2} m", l.drift_m)).collect();
+    if !drifts.is_empty() {
+        writeln!(text, "loops closed: {}, after a drift of {}", drifts.len(), drifts.join(", "))?;
+    }
+    if joins > 0 {
+        writeln!(text, "submaps joined: {joins}")?;
     }
     if let Some(longest) = places.lost.iter().map(|stretch| stretch.frames).max() {
         let found = places.lost.iter().filter(|stretch| stretch.found_again).count();

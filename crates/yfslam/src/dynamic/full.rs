@@ -9,7 +9,7 @@ use crate::dynamic::body_mask::BodyMask;
 use crate::dynamic::tracks::Tracks;
 use crate::dynamic::views::Views;
 use crate::dynamic::yf::DepthGroups;
-use crate::dynamic::{Door, Evidence, Region, Tie};
+use crate::dynamic::{Evidence, FirstPose, Region, Tie};
 use crate::features::FrameFeatures;
 
 /// Outlines bodies and what has moved. Buffers are reused.
@@ -36,10 +36,7 @@ impl Full {
         features: &mut FrameFeatures,
         regions: &mut Vec<Region>,
     ) {
-        self.bodies.begin(evidence.depth);
-        if let Some(mask) = evidence.mask {
-            self.bodies.mark_mask(mask);
-        }
+        self.begin(evidence);
         self.outline(config, groups, tracks, 0.0);
         regions.extend(tracks.list.iter().map(|track| Region {
             bbox: track.bbox,
@@ -55,16 +52,26 @@ impl Full {
         regions.sort_by(|a, b| b.score.total_cmp(&a.score));
         while self.distrust(0.0, evidence.scale_factors, features) < wanted {
             let Some(dropped) = regions.pop() else { return };
-            self.bodies.begin(evidence.depth);
-            self.outline(config, groups, tracks, dropped.score + f32::EPSILON);
+            // Those of like confidence go together.
+            regions.retain(|region| region.score > dropped.score);
+            self.begin(evidence);
+            self.outline(config, groups, tracks, dropped.score.next_up());
+        }
+    }
+
+    /// Begins a frame with what its mask says.
+    fn begin(&mut self, evidence: &Evidence<'_>) {
+        self.bodies.begin(evidence.depth);
+        if let Some(mask) = evidence.mask {
+            self.bodies.mark_mask(mask);
         }
     }
 
     /// Distrusts features on what has moved since earlier views, of which a first pose tells. Returns whether there is any.
-    pub fn after_pose(&mut self, config: &DynamicConfig, door: &Door<'_>, features: &mut FrameFeatures) -> bool {
+    pub fn after_pose(&mut self, config: &DynamicConfig, first: &FirstPose<'_>, features: &mut FrameFeatures) -> bool {
         self.bodies.coarse(&mut self.coarse_m);
         let (bodies, mut found) = (&mut self.bodies, false);
-        self.views.changed(&config.full, door, &self.coarse_m, |column, row| {
+        self.views.changed(&config.full, first, &self.coarse_m, |column, row| {
             bodies.mark_coarse(column, row);
             found = true;
         });
@@ -73,7 +80,7 @@ impl Full {
         }
         let mut trusted: usize = features.features.iter().filter(|f| f.trust > 0.0).count();
         for f in &mut features.features {
-            let edge_px = config.full.edge_px * door.sensor.scale(f.octave);
+            let edge_px = config.full.edge_px * first.sensor.scale(f.octave);
             if f.trust > 0.0 && trusted > config.min_trusted && self.bodies.covers(f.raw, edge_px) {
                 f.trust = 0.0;
                 trusted -= 1;
@@ -91,7 +98,7 @@ impl Full {
     }
 
     /// Forgets all views.
-    pub fn reset(&mut self) {
+    pub fn forget_views(&mut self) {
         self.views.clear();
     }
 

@@ -64,7 +64,7 @@ pub struct Evidence<'a> {
 }
 
 /// A first pose, and what it can be compared with.
-pub struct Door<'a> {
+pub struct FirstPose<'a> {
     /// The camera.
     pub sensor: &'a SensorModel,
     /// The map.
@@ -116,8 +116,8 @@ impl DynamicFilter {
     }
 
     /// Sharpens the trust of `features` when a first pose stands. Returns whether that changed.
-    pub fn after_pose(&mut self, config: &DynamicConfig, door: &Door<'_>, features: &mut FrameFeatures) -> bool {
-        config.method == Method::Full && self.full.after_pose(config, door, features)
+    pub fn after_pose(&mut self, config: &DynamicConfig, first: &FirstPose<'_>, features: &mut FrameFeatures) -> bool {
+        config.method == Method::Full && self.full.after_pose(config, first, features)
     }
 
     /// Takes note of the pose of the frame.
@@ -132,11 +132,9 @@ impl DynamicFilter {
         &self.regions
     }
 
-    /// Forgets all tracks and views.
-    pub fn reset(&mut self) {
-        self.tracks = Tracks::default();
-        self.regions.clear();
-        self.full.reset();
+    /// Forgets earlier views: the world begins anew.
+    pub fn forget_views(&mut self) {
+        self.full.forget_views();
     }
 }
 

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use nalgebra::{Isometry3, Point3};
 
 use crate::config::FullConfig;
-use crate::dynamic::{Door, Tie};
+use crate::dynamic::{FirstPose, Tie};
 use crate::geometry::Pose;
 use crate::sensor::SensorModel;
 
@@ -67,11 +67,11 @@ impl Views {
     pub fn changed(
         &mut self,
         config: &FullConfig,
-        door: &Door<'_>,
+        first: &FirstPose<'_>,
         depth_m: &[f32],
         mut moving: impl FnMut(usize, usize),
     ) {
-        let Door { sensor, map, t_cam_world } = *door;
+        let FirstPose { sensor, map, t_cam_world } = *first;
         self.prepare(sensor);
         self.nearer.clear();
         self.nearer.resize(depth_m.len(), 0);
@@ -157,9 +157,9 @@ impl Views {
                     }
                 }
                 if alike {
-                    self.alike[cell] += 1;
+                    self.alike[cell] = self.alike[cell].saturating_add(1);
                 } else if known >= 3 && z < least - tolerance {
-                    self.nearer[cell] += 1;
+                    self.nearer[cell] = self.nearer[cell].saturating_add(1);
                 }
             }
         }
@@ -198,7 +198,7 @@ impl Views {
     }
 
     fn is_new(&self, cell: usize) -> bool {
-        self.nearer[cell] >= 2 && self.nearer[cell] > 2 * self.alike[cell]
+        self.nearer[cell] >= 2 && u16::from(self.nearer[cell]) > 2 * u16::from(self.alike[cell])
     }
 }
 
@@ -225,9 +225,9 @@ mod tests {
         for _ in 0..3 {
             views.keep(&config.dynamic.full, 0, (reference, Pose::identity()), &depths(&before));
         }
-        let door = Door { sensor: &sensor, map: &map, t_cam_world: &moved };
+        let first = FirstPose { sensor: &sensor, map: &map, t_cam_world: &moved };
         let mut cells = Vec::new();
-        views.changed(&config.dynamic.full, &door, &depths(&shown), |column, row| cells.push((column, row)));
+        views.changed(&config.dynamic.full, &first, &depths(&shown), |column, row| cells.push((column, row)));
         cells
     }
 

@@ -13,7 +13,7 @@ use crate::camera::Camera;
 use crate::config::Config;
 use crate::detection::{Detection, Detector};
 use crate::detector_thread::DetectorThread;
-use crate::dynamic::{Door, DynamicFilter, Evidence, Method};
+use crate::dynamic::{DynamicFilter, Evidence, FirstPose, Method};
 use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
@@ -288,7 +288,8 @@ impl Slam {
             ("colour", frame.color.width(), frame.color.height()),
             ("depth", frame.depth.raw.width(), frame.depth.raw.height()),
         ];
-        for (image, width, height) in sizes {
+        let mask = frame.mask.iter().map(|mask| ("mask", mask.width(), mask.height()));
+        for (image, width, height) in sizes.into_iter().chain(mask) {
             if (width, height) != (camera_width, camera_height) {
                 return Err(FrameRejected::Size { image, width, height, camera_width, camera_height });
             }
@@ -418,6 +419,7 @@ impl Slam {
                 self.owner.forget(root);
             }
         }
+        self.filter.forget_views();
         self.tracker.reset();
         TrackingState::NotInitialized
     }
@@ -442,8 +444,8 @@ impl StageTimes {
 
 /// Compares the frame with the map by its first pose; what turns out to move is dropped, and the pose refined without it.
 fn sharpen(filter: &mut DynamicFilter, current: &mut TrackedFrame, sensor: &SensorModel, config: &Config, map: &Map) {
-    let door = Door { sensor, map, t_cam_world: &current.t_cam_world };
-    if filter.after_pose(&config.dynamic, &door, &mut current.features) {
+    let first = FirstPose { sensor, map, t_cam_world: &current.t_cam_world };
+    if filter.after_pose(&config.dynamic, &first, &mut current.features) {
         current.drop_distrusted();
         current.refine_pose(sensor, &config.pose);
     }
