@@ -10,6 +10,14 @@ use crate::image::{DepthImage, Image};
 /// Side of a cell, px.
 pub const CELL_PX: usize = 4;
 
+/// Owner of cells that move without being a track's body: they were in a mask, or have moved since earlier views.
+const NO_TRACK: u8 = u8::MAX;
+
+/// The owner that stands for a track; those past the last number share it.
+fn owner(track: usize) -> u8 {
+    track.min(usize::from(NO_TRACK) - 2) as u8 + 1
+}
+
 /// Which cells of the image show something that moves. Buffers are reused.
 #[derive(Clone, Debug, Default)]
 pub struct BodyMask {
@@ -17,7 +25,8 @@ pub struct BodyMask {
     rows: usize,
     /// Depth in the middle of each cell, m; 0 where it is unknown.
     depth_m: Vec<f32>,
-    moving: Vec<bool>,
+    /// Whose body each cell belongs to: 0 nobody's.
+    owner: Vec<u8>,
     /// Cells of the body that is being outlined.
     body: Vec<Reached>,
 }
@@ -43,8 +52,8 @@ impl BodyMask {
             let cell = |column: usize| depth.metres(column * CELL_PX + CELL_PX / 2, y).unwrap_or(0.0);
             self.depth_m.extend((0..self.columns).map(cell));
         }
-        self.moving.clear();
-        self.moving.resize(self.depth_m.len(), false);
+        self.owner.clear();
+        self.owner.resize(self.depth_m.len(), 0);
     }
 
     /// Appends the depths in a box that belong to no body yet, m.
@@ -52,14 +61,15 @@ impl BodyMask {
         let [left, top, right, bottom] = self.cells(bbox, 0.0);
         for row in top..bottom {
             let line = row * self.columns..(row + 1) * self.columns;
-            let cells = self.depth_m[line.clone()].iter().zip(&self.moving[line]).take(right).skip(left);
-            out.extend(cells.filter(|(z, moving)| **z > 0.0 && !**moving).map(|(z, _)| *z));
+            let cells = self.depth_m[line.clone()].iter().zip(&self.owner[line]).take(right).skip(left);
+            out.extend(cells.filter(|(z, owner)| **z > 0.0 && **owner == 0).map(|(z, _)| *z));
         }
     }
 
-    /// Marks the body whose middle is `center_m` away: the cells of the box at that depth, and those in the box grown by `config.margin`
+    /// Marks the body of a track, whose middle is `center_m` away: the cells of the box at that depth, and those in the box grown by `config.margin`
     /// to which the surface leads on without a step, over gaps without depth too. Of the gaps, those in the box are marked.
-    pub fn grow(&mut self, config: &DynamicConfig, bbox: &BoundingBox, center_m: f32) {
+    pub fn grow(&mut self, config: &DynamicConfig, track: usize, bbox: &BoundingBox, center_m: f32) {
+        let owner = owner(track);
         let (inner, outer) = (self.cells(bbox, 0.0), self.cells(bbox, config.margin));
         let [near, far] = [center_m - config.group_half_width_m, center_m + config.group_half_width_m];
         let [nearest, farthest] = [near - config.reach_m, far + config.reach_m];
@@ -68,8 +78,8 @@ impl BodyMask {
             for column in inner[0]..inner[2] {
                 let cell = row * self.columns + column;
                 let z = self.depth_m[cell];
-                if z >= near && z <= far && !self.moving[cell] {
-                    self.moving[cell] = true;
+                if z >= near && z <= far && self.owner[cell] == 0 {
+                    self.owner[cell] = owner;
                     self.body.push(Reached { cell: cell as u32, depth_m: z, gap: 0 });
                 }
             }
@@ -87,13 +97,13 @@ impl BodyMask {
                     continue;
                 }
                 let cell = r * self.columns + c;
-                if self.moving[cell] {
+                if self.owner[cell] != 0 {
                     continue;
                 }
                 let z = self.depth_m[cell];
                 if z > 0.0 {
                     if (z - depth_m).abs() <= step && z >= nearest && z <= farthest {
-                        self.moving[cell] = true;
+                        self.owner[cell] = owner;
                         self.body.push(Reached { cell: cell as u32, depth_m: z, gap: 0 });
                     }
                 } else if gap < config.full.max_gap_cells
@@ -102,7 +112,7 @@ impl BodyMask {
                     && c >= inner[0]
                     && c < inner[2]
                 {
-                    self.moving[cell] = true;
+                    self.owner[cell] = owner;
                     self.body.push(Reached { cell: cell as u32, depth_m, gap: gap + 1 });
                 }
             }
@@ -111,10 +121,12 @@ impl BodyMask {
 
     /// Marks the cells whose middle a mask of movable objects covers.
     pub fn mark_mask(&mut self, mask: &Image<u8>) {
-        for (row, line) in self.moving.chunks_mut(self.columns.max(1)).enumerate() {
+        for (row, line) in self.owner.chunks_mut(self.columns.max(1)).enumerate() {
             let y = row * CELL_PX + CELL_PX / 2;
-            for (column, moving) in line.iter_mut().enumerate() {
-                *moving |= mask.get(column * CELL_PX + CELL_PX / 2, y).is_some_and(|number| *number > 0);
+            for (column, owner) in line.iter_mut().enumerate() {
+                if mask.get(column * CELL_PX + CELL_PX / 2, y).is_some_and(|number| *number > 0) {
+                    *owner = NO_TRACK;
+                }
             }
         }
     }
@@ -122,31 +134,48 @@ impl BodyMask {
     /// Whether a box shows something that moves.
     pub fn holds_body(&self, bbox: &BoundingBox) -> bool {
         let [left, top, right, bottom] = self.cells(bbox, 0.0);
-        (top..bottom).any(|row| self.moving[row * self.columns..].iter().take(right).skip(left).any(|moving| *moving))
+        (top..bottom).any(|row| self.owner[row * self.columns..].iter().take(right).skip(left).any(|owner| *owner != 0))
     }
 
-    /// Marks a whole box.
-    pub fn fill(&mut self, bbox: &BoundingBox) {
+    /// Marks the whole box of a track.
+    pub fn fill(&mut self, track: usize, bbox: &BoundingBox) {
         let [left, top, right, bottom] = self.cells(bbox, 0.0);
         for row in top..bottom {
-            self.moving[row * self.columns + left..row * self.columns + right.max(left)].fill(true);
+            self.owner[row * self.columns + left..row * self.columns + right.max(left)].fill(owner(track));
         }
     }
 
-    /// Depths of every second cell of every second row, m; 0 where it is unknown or something moves.
-    pub fn coarse(&self, out: &mut Vec<f32>) {
-        out.clear();
-        for row in (0..self.rows / 2 * 2).step_by(2) {
-            let cells = (row * self.columns..row * self.columns + self.columns / 2 * 2).step_by(2);
-            out.extend(cells.map(|cell| if self.moving[cell] { 0.0 } else { self.depth_m[cell] }));
-        }
+    /// Every second cell of every second row: whether something moves there, and its depth, m, 0 where it is unknown.
+    pub fn coarse(&self) -> impl Iterator<Item = (bool, f32)> + '_ {
+        self.coarse_cells().map(|cell| (self.owner[cell] != 0, self.depth_m[cell]))
+    }
+
+    /// The track whose body each of the same cells belongs to.
+    pub fn coarse_tracks(&self) -> impl Iterator<Item = Option<usize>> + '_ {
+        self.coarse_cells().map(|cell| match self.owner[cell] {
+            0 | NO_TRACK => None,
+            owner => Some(usize::from(owner) - 1),
+        })
+    }
+
+    fn coarse_cells(&self) -> impl Iterator<Item = usize> + use<> {
+        let (rows, columns) = (self.rows / 2, self.columns / 2);
+        let width = self.columns;
+        (0..rows).flat_map(move |row| (0..columns).map(move |column| 2 * row * width + 2 * column))
+    }
+
+    /// Takes back what was marked for a track.
+    pub fn release(&mut self, track: usize) {
+        let owner = owner(track);
+        self.owner.iter_mut().filter(|o| **o == owner).for_each(|o| *o = 0);
     }
 
     /// Marks a cell of twice the side, and what adjoins it.
     pub fn mark_coarse(&mut self, column: usize, row: usize) {
         for r in (2 * row).saturating_sub(1)..(2 * row + 3).min(self.rows) {
             let line = r * self.columns;
-            self.moving[line + (2 * column).saturating_sub(1)..line + (2 * column + 3).min(self.columns)].fill(true);
+            let cells = line + (2 * column).saturating_sub(1)..line + (2 * column + 3).min(self.columns);
+            self.owner[cells].iter_mut().filter(|owner| **owner == 0).for_each(|owner| *owner = NO_TRACK);
         }
     }
 
@@ -157,7 +186,7 @@ impl BodyMask {
         (top..=bottom.min(self.rows.saturating_sub(1))).any(|row| {
             let (from, to) =
                 (row * self.columns + left, row * self.columns + right.min(self.columns.saturating_sub(1)));
-            self.moving.get(from..=to).is_some_and(|cells| cells.contains(&true))
+            self.owner.get(from..=to).is_some_and(|cells| cells.iter().any(|owner| *owner != 0))
         })
     }
 
@@ -201,7 +230,7 @@ mod tests {
         let (config, mut bodies) = (DynamicConfig::default(), BodyMask::default());
         bodies.begin(&depth(somebody));
         let bbox = BoundingBox { x_min: 92.0, y_min: 40.0, x_max: 195.0, y_max: 240.0 };
-        bodies.grow(&config, &bbox, near_m);
+        bodies.grow(&config, 0, &bbox, near_m);
         bodies
     }
 

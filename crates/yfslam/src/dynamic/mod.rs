@@ -106,7 +106,7 @@ impl DynamicFilter {
             }
             Method::Full => {
                 let depths = self.groups.depths_of(config, movable, depth, features);
-                self.tracks.update(config, config.full.max_misses, movable, depths, size);
+                self.tracks.update(config, self.full.max_misses(config), movable, depths, size);
                 let Self { full, groups, tracks, regions, .. } = self;
                 full.before_pose(config, groups, tracks, evidence, features, regions);
                 return;
@@ -117,7 +117,7 @@ impl DynamicFilter {
 
     /// Sharpens the trust of `features` when a first pose stands. Returns whether that changed.
     pub fn after_pose(&mut self, config: &DynamicConfig, first: &FirstPose<'_>, features: &mut FrameFeatures) -> bool {
-        config.method == Method::Full && self.full.after_pose(config, first, features)
+        config.method == Method::Full && self.full.after_pose(config, &mut self.tracks, first, features)
     }
 
     /// Takes note of the pose of the frame.

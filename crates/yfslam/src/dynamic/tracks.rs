@@ -17,6 +17,8 @@ pub struct Track {
     pub misses: usize,
     /// Depth of the body when last seen, m.
     pub depth_m: Option<f32>,
+    /// Whether it was found to show nothing; the next update drops it.
+    pub ended: bool,
     /// Motion of the box's centre, px per frame.
     velocity: [f32; 2],
 }
@@ -43,6 +45,7 @@ impl Tracks {
         depths_m: &[Option<f32>],
         [width, height]: [usize; 2],
     ) {
+        self.list.retain(|track| !track.ended);
         for track in &mut self.list {
             track.misses += 1;
             track.bbox = shifted(&track.bbox, track.velocity);
@@ -78,6 +81,7 @@ impl Tracks {
                     score: detection.score,
                     misses: 0,
                     depth_m: None,
+                    ended: false,
                     velocity: [0.0; 2],
                 });
             }

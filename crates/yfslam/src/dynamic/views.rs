@@ -1,7 +1,7 @@
 //! What has moved since it was last seen, whatever it is: the depth image against those of a few earlier frames.
 //!
-//! In: coarse depth of the frame, its first pose, earlier views. Out: cells where something stands that was not there before. The test
-//! is that of DynaSLAM (IEEE RA-L 2018, section III-C), on all of the image instead of key points: a depth that is clearly less than
+//! In: coarse depth of the frame, its first pose, earlier views. Out: cells where something stands that was not there before, and cells
+//! where all is as it was. The test is that of DynaSLAM (IEEE RA-L 2018, section III-C), on all of the image instead of key points: a depth that is clearly less than
 //! what earlier views say about that direction.
 
 use std::collections::VecDeque;
@@ -36,6 +36,8 @@ pub struct Views {
     predicted_m: Vec<f32>,
     nearer: Vec<u8>,
     alike: Vec<u8>,
+    /// Views that predict what the frame sees, within half the tolerance.
+    same: Vec<u8>,
     component: Vec<u32>,
 }
 
@@ -63,20 +65,16 @@ impl Views {
         self.ring.clear();
     }
 
-    /// Calls `moving` with each cell (column, row) of what stands nearer than earlier views allow. `depth_m` are the frame's cells.
-    pub fn changed(
-        &mut self,
-        config: &FullConfig,
-        first: &FirstPose<'_>,
-        depth_m: &[f32],
-        mut moving: impl FnMut(usize, usize),
-    ) {
+    /// Compares the depths of the frame's cells with all views that tell something about them.
+    pub fn compare_all(&mut self, config: &FullConfig, first: &FirstPose<'_>, depth_m: &[f32]) {
         let FirstPose { sensor, map, t_cam_world } = *first;
         self.prepare(sensor);
         self.nearer.clear();
         self.nearer.resize(depth_m.len(), 0);
         self.alike.clear();
         self.alike.resize(depth_m.len(), 0);
+        self.same.clear();
+        self.same.resize(depth_m.len(), 0);
         for index in 0..self.ring.len() {
             let view = &self.ring[index];
             let (reference, t_view_reference) = view.tie;
@@ -90,7 +88,12 @@ impl Views {
             self.predict(index, sensor, &t_cam_view);
             self.compare(config, depth_m);
         }
-        self.clusters(config, depth_m, &mut moving);
+    }
+
+    /// Whether a cell shows what stood there in earlier views; `None` if they do not tell.
+    pub fn is_as_before(&self, cell: usize) -> Option<bool> {
+        let (same, nearer) = (self.same[cell], self.nearer[cell]);
+        (same.max(nearer) >= 2).then_some(same > nearer)
     }
 
     fn prepare(&mut self, sensor: &SensorModel) {
@@ -148,16 +151,17 @@ impl Views {
                     continue;
                 }
                 let tolerance = config.view_tolerance_m + config.view_tolerance_share * z;
-                let (mut known, mut least, mut alike) = (0, f32::INFINITY, false);
+                let (mut known, mut least, mut error) = (0, f32::INFINITY, f32::INFINITY);
                 for r in row - 1..=row + 1 {
                     for &p in &self.predicted_m[r * self.columns + column - 1..=r * self.columns + column + 1] {
                         known += usize::from(p.is_finite());
                         least = least.min(p);
-                        alike |= (p - z).abs() <= tolerance;
+                        error = error.min((p - z).abs());
                     }
                 }
-                if alike {
+                if error <= tolerance {
                     self.alike[cell] = self.alike[cell].saturating_add(1);
+                    self.same[cell] = self.same[cell].saturating_add(u8::from(error <= 0.5 * tolerance));
                 } else if known >= 3 && z < least - tolerance {
                     self.nearer[cell] = self.nearer[cell].saturating_add(1);
                 }
@@ -165,11 +169,12 @@ impl Views {
         }
     }
 
-    /// Reports clusters of cells that are nearer than views allow.
-    fn clusters(&mut self, config: &FullConfig, depth_m: &[f32], moving: &mut impl FnMut(usize, usize)) {
+    /// Calls `moving` with each cell (column, row) of what stands nearer than earlier views allow; `depth_m` are those compared, 0 where
+    /// it is known already that something moves.
+    pub fn clusters(&mut self, config: &FullConfig, depth_m: &[f32], mut moving: impl FnMut(usize, usize)) {
         let columns = self.columns;
         for seed in 0..depth_m.len() {
-            if !self.is_new(seed) {
+            if !self.is_new(seed, depth_m) {
                 continue;
             }
             self.component.clear();
@@ -181,7 +186,7 @@ impl Views {
                 let cell = cell as usize;
                 for neighbour in [cell.wrapping_sub(columns), cell + columns, cell.wrapping_sub(1), cell + 1] {
                     if neighbour < depth_m.len()
-                        && self.is_new(neighbour)
+                        && self.is_new(neighbour, depth_m)
                         && (depth_m[neighbour] - depth_m[cell]).abs() <= config.view_thing_step_m
                     {
                         self.nearer[neighbour] = 0;
@@ -197,8 +202,8 @@ impl Views {
         }
     }
 
-    fn is_new(&self, cell: usize) -> bool {
-        self.nearer[cell] >= 2 && u16::from(self.nearer[cell]) > 2 * u16::from(self.alike[cell])
+    fn is_new(&self, cell: usize, depth_m: &[f32]) -> bool {
+        depth_m[cell] > 0.0 && self.nearer[cell] >= 2 && u16::from(self.nearer[cell]) > 2 * u16::from(self.alike[cell])
     }
 }
 
@@ -227,7 +232,8 @@ mod tests {
         }
         let first = FirstPose { sensor: &sensor, map: &map, t_cam_world: &moved };
         let mut cells = Vec::new();
-        views.changed(&config.dynamic.full, &first, &depths(&shown), |column, row| cells.push((column, row)));
+        views.compare_all(&config.dynamic.full, &first, &depths(&shown));
+        views.clusters(&config.dynamic.full, &depths(&shown), |column, row| cells.push((column, row)));
         cells
     }
 
