@@ -145,23 +145,32 @@ impl BodyMask {
         }
     }
 
-    /// Every second cell of every second row: whether something moves there, and its depth, m, 0 where it is unknown.
+    /// Every second cell of every second row, a coarse cell: whether something moves there, and its depth, m, 0 where it is unknown.
     pub fn coarse(&self) -> impl Iterator<Item = (bool, f32)> + '_ {
-        self.coarse_cells().map(|cell| (self.owner[cell] != 0, self.depth_m[cell]))
+        let count = (self.rows / 2) * (self.columns / 2);
+        (0..count).map(|coarse| self.finest(coarse)).map(|cell| (self.owner[cell] != 0, self.depth_m[cell]))
     }
 
-    /// The track whose body each of the same cells belongs to.
-    pub fn coarse_tracks(&self) -> impl Iterator<Item = Option<usize>> + '_ {
-        self.coarse_cells().map(|cell| match self.owner[cell] {
+    /// The track whose body a coarse cell belongs to.
+    pub fn track_at(&self, coarse: usize) -> Option<usize> {
+        match self.owner[self.finest(coarse)] {
             0 | NO_TRACK => None,
             owner => Some(usize::from(owner) - 1),
-        })
+        }
     }
 
-    fn coarse_cells(&self) -> impl Iterator<Item = usize> + use<> {
-        let (rows, columns) = (self.rows / 2, self.columns / 2);
-        let width = self.columns;
-        (0..rows).flat_map(move |row| (0..columns).map(move |column| 2 * row * width + 2 * column))
+    /// Takes back what was marked in a coarse cell.
+    pub fn release_coarse(&mut self, coarse: usize) {
+        let cell = self.finest(coarse);
+        for line in [cell, cell + self.columns] {
+            self.owner[line..line + 2].fill(0);
+        }
+    }
+
+    /// The upper left of the four cells that make a coarse one.
+    fn finest(&self, coarse: usize) -> usize {
+        let half = (self.columns / 2).max(1);
+        2 * (coarse / half) * self.columns + 2 * (coarse % half)
     }
 
     /// Takes back what was marked for a track.

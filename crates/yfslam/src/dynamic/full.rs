@@ -89,7 +89,7 @@ impl Full {
         self.compared = true;
         self.sample();
         self.views.compare_all(&config.full, first, &self.coarse_m);
-        self.drop_ghosts(config, tracks);
+        self.return_unmoved(config, tracks);
         let (bodies, mut found) = (&mut self.bodies, false);
         self.views.clusters(&config.full, &self.static_m, |column, row| {
             bodies.mark_coarse(column, row);
@@ -110,15 +110,20 @@ impl Full {
         found
     }
 
-    /// Gives up tracks carried without a box whose body is nothing but what was there before.
-    fn drop_ghosts(&mut self, config: &DynamicConfig, tracks: &mut Tracks) {
+    /// Takes back what was outlined but shows only what was there before, whatever a box says; a track without a box that is mostly such
+    /// ends.
+    fn return_unmoved(&mut self, config: &DynamicConfig, tracks: &mut Tracks) {
         self.verdicts.clear();
         self.verdicts.resize(tracks.list.len(), [0; 2]);
-        for (cell, track) in self.bodies.coarse_tracks().enumerate() {
-            if let (Some(verdict), Some(as_before)) =
-                (track.and_then(|t| self.verdicts.get_mut(t)), self.views.is_as_before(cell))
-            {
+        for cell in 0..self.coarse_m.len() {
+            let (track, Some(as_before)) = (self.bodies.track_at(cell), self.views.is_as_before(cell)) else {
+                continue;
+            };
+            if let Some(verdict) = track.and_then(|t| self.verdicts.get_mut(t)) {
                 verdict[usize::from(!as_before)] += 1;
+            }
+            if as_before {
+                self.bodies.release_coarse(cell);
             }
         }
         for (t, (track, [same, other])) in tracks.list.iter_mut().zip(&self.verdicts).enumerate() {
