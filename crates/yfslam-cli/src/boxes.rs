@@ -61,7 +61,7 @@ pub fn choose(
     methods: &[Method],
     terminal: Terminal,
 ) -> Result<(BoxOrigin, Option<LoadedDetector>)> {
-    if methods.iter().all(|method| *method == Method::None) {
+    if !methods.iter().any(|method| method.needs_boxes()) {
         return Ok((BoxOrigin::None, None));
     }
     if args.detector.is_none() && source.is_synthetic() {

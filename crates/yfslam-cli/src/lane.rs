@@ -130,7 +130,7 @@ impl Lane {
         map.save(&mut pipeline)?;
         let mut outcome = pipeline.finish(&config)?;
         let mut shared = judge_by.reading.clone();
-        let needs_boxes = config.dynamic.method != Method::None;
+        let needs_boxes = config.dynamic.method.needs_boxes();
         if needs_boxes {
             let DetectionTally { stages, cpu, failures } = judge_by.detection;
             shared = shared.and(stages);

@@ -1,12 +1,16 @@
 //! Which features may be trusted to be static (YF-SLAM, section 3.3).
 //!
 //! In: boxes of movable objects, the depth image, the frame's features. Out: each feature's trust. Nothing else in the core knows that
-//! people exist.
+//! people exist. One file per method; [`Method::filter`] makes the filter that a name stands for.
 
+mod body_depth;
 mod body_mask;
 mod boxes;
 pub mod depth_group;
 mod full;
+mod none;
+mod outline;
+mod region;
 mod tracks;
 mod views;
 mod yf;
@@ -14,14 +18,13 @@ mod yf;
 use serde::{Deserialize, Serialize};
 
 use crate::config::DynamicConfig;
-use crate::detection::{BoundingBox, Detection};
+use crate::detection::Detection;
 use crate::features::FrameFeatures;
 use crate::geometry::Pose;
-use crate::image::{DepthImage, Image};
+use crate::image::{DepthImage, GrayImage, Image};
 use crate::map::{KeyFrameId, Map};
 use crate::sensor::SensorModel;
-use full::Full;
-use tracks::Tracks;
+pub use region::Region;
 
 /// How moving things are kept out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,25 +41,14 @@ pub enum Method {
     Full,
 }
 
-/// A part of the image that was found to move.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Region {
-    /// Where it is, px of the raw image.
-    pub bbox: BoundingBox,
-    /// Confidence of the detection it rests on.
-    pub score: f32,
-    /// Frames since that detection; 0 if it is of this frame.
-    pub misses: usize,
-    /// Depths of the moving body, m; `None` if the whole box moves.
-    pub depth_m: Option<[f32; 2]>,
-}
-
 /// What is known of a frame before its pose.
 pub struct Evidence<'a> {
     /// Boxes of movable objects, at any score.
     pub movable: &'a [Detection],
     /// Pixels of movable objects, where somebody knows them.
     pub mask: Option<&'a Image<u8>>,
+    /// The picture.
+    pub gray: &'a GrayImage,
     /// The depth image.
     pub depth: &'a DepthImage,
     /// Scales of the pyramid's levels.
@@ -76,110 +68,45 @@ pub struct FirstPose<'a> {
 /// A keyframe and the pose of a frame seen from there, `t_cam_reference`: it moves along when the map is corrected.
 pub type Tie = (KeyFrameId, Pose);
 
-/// Decides about the features of one frame after another.
-#[derive(Clone, Debug, Default)]
-pub struct DynamicFilter {
-    tracks: Tracks,
-    regions: Vec<Region>,
-    groups: yf::DepthGroups,
-    full: Full,
+impl Method {
+    /// The filter of this name; its random draws start from `seed`.
+    pub fn filter(self, seed: u64) -> Box<dyn DynamicFilter> {
+        match self {
+            Self::None => Box::new(none::NoFilter),
+            Self::Boxes => Box::<boxes::Boxes>::default(),
+            Self::Yf => Box::new(yf::Yf::new(seed)),
+            Self::Full => Box::new(full::Full::new(seed)),
+        }
+    }
+
+    /// Whether boxes of movable objects tell it anything.
+    pub fn needs_boxes(self) -> bool {
+        self != Self::None
+    }
 }
 
-impl DynamicFilter {
-    /// A filter whose random draws start from `seed`.
-    pub fn new(seed: u64) -> Self {
-        Self { groups: yf::DepthGroups::new(seed), ..Self::default() }
-    }
+/// Decides about the features of one frame after another. Buffers are reused: after warm-up no call allocates.
+pub trait DynamicFilter: Send + Sync {
+    /// Sets the trust of `features` from what boxes, masks and pictures tell, before the pose is known.
+    fn before_pose(&mut self, config: &DynamicConfig, evidence: &Evidence<'_>, features: &mut FrameFeatures);
 
-    /// Sets the trust of `features` from what boxes, masks and depth tell, before the pose is known.
-    pub fn before_pose(&mut self, config: &DynamicConfig, evidence: &Evidence<'_>, features: &mut FrameFeatures) {
-        self.regions.clear();
-        let &Evidence { movable, depth, scale_factors, .. } = evidence;
-        let size = [depth.raw.width(), depth.raw.height()];
-        match config.method {
-            Method::None => return,
-            Method::Boxes => self.regions.extend(boxes::regions(config, movable)),
-            Method::Yf => {
-                let depths = self.groups.depths_of(config, movable, depth, features);
-                self.tracks.update(config, config.max_misses, movable, depths, size);
-                self.groups.regions(config, &mut self.tracks, depth, features, &mut self.regions);
-            }
-            Method::Full => {
-                let depths = self.groups.depths_of(config, movable, depth, features);
-                self.tracks.update(config, self.full.max_misses(config), movable, depths, size);
-                let Self { full, groups, tracks, regions, .. } = self;
-                full.before_pose(config, groups, tracks, evidence, features, regions);
-                return;
-            }
-        }
-        apply(config, &mut self.regions, depth, features, scale_factors);
-    }
-
-    /// Sharpens the trust of `features` when a first pose stands. Returns whether that changed.
-    pub fn after_pose(&mut self, config: &DynamicConfig, first: &FirstPose<'_>, features: &mut FrameFeatures) -> bool {
-        config.method == Method::Full && self.full.after_pose(config, &mut self.tracks, first, features)
+    /// Sharpens the trust of `features` when a first pose stands. Returns whether any lost it.
+    fn after_pose(&mut self, _config: &DynamicConfig, _first: &FirstPose<'_>, _features: &mut FrameFeatures) -> bool {
+        false
     }
 
     /// Takes note of the pose of the frame.
-    pub fn end_frame(&mut self, config: &DynamicConfig, timestamp_ns: i64, tie: Option<Tie>) {
-        if let (Method::Full, Some(tie)) = (config.method, tie) {
-            self.full.keep_view(config, timestamp_ns, tie);
-        }
-    }
+    fn end_frame(&mut self, _config: &DynamicConfig, _timestamp_ns: i64, _tie: Tie) {}
 
-    /// The parts of the last frame that were found to move.
-    pub fn regions(&self) -> &[Region] {
-        &self.regions
+    /// The boxes in the last frame that were found to hold something that moves.
+    fn regions(&self) -> &[Region];
+
+    /// Whether a position of the raw image, px, shows something that moves in the last frame, whose depth is given, or lies within
+    /// `edge_px` of it.
+    fn moves_at(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
+        self.regions().iter().any(|region| region.covers(depth, raw, edge_px))
     }
 
     /// Forgets earlier views: the world begins anew.
-    pub fn forget_views(&mut self) {
-        self.full.forget_views();
-    }
-}
-
-/// Distrusts the features of all regions. If that leaves too few, the regions of least confidence are given up one by one: a false box
-/// must not take the ground from under tracking.
-fn apply(
-    config: &DynamicConfig,
-    regions: &mut Vec<Region>,
-    depth: &DepthImage,
-    features: &mut FrameFeatures,
-    scale_factors: &[f32],
-) {
-    regions.sort_by(|a, b| b.score.total_cmp(&a.score));
-    loop {
-        let mut trusted = 0;
-        for f in &mut features.features {
-            let scale = scale_factors.get(usize::from(f.octave)).copied().unwrap_or(1.0);
-            let moving = regions.iter().any(|r| r.covers(depth, f.raw, config.edge_px * scale));
-            f.trust = if moving { 0.0 } else { 1.0 };
-            trusted += usize::from(!moving);
-        }
-        if trusted >= config.min_trusted.min(features.len()) || regions.pop().is_none() {
-            return;
-        }
-    }
-}
-
-impl Region {
-    /// Whether a feature at a raw position belongs to the moving body: inside the box, at the body's depth or without depth, or with the
-    /// body within `edge_px` of it.
-    fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
-        let [x, y] = raw;
-        if !self.bbox.contains(x, y) {
-            return false;
-        }
-        let Some([near, far]) = self.depth_m else { return true };
-        let at = |dx: f32, dy: f32| depth.metres((x + dx + 0.5).max(0.0) as usize, (y + dy + 0.5).max(0.0) as usize);
-        let moves = |z: f32| z >= near && z <= far;
-        if at(0.0, 0.0).is_none_or(moves) {
-            return true;
-        }
-        // A corner on the outline belongs to neither side: its descriptor sees both.
-        let (r, h) = (edge_px, edge_px * std::f32::consts::FRAC_1_SQRT_2);
-        [(r, 0.0), (-r, 0.0), (0.0, r), (0.0, -r), (h, h), (h, -h), (-h, h), (-h, -h)]
-            .iter()
-            .any(|&(dx, dy)| at(dx, dy).is_some_and(moves))
-    }
+    fn forget_views(&mut self) {}
 }

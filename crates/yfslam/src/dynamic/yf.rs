@@ -1,178 +1,70 @@
-//! Method `yf`: Geometric Depth RANSAC inside boxes (YF-SLAM section 3.3), guarded where it is known to fail.
+//! Method `yf`: inside a box, what has the depth of the body is dropped and the background stays (YF-SLAM section 3.3).
 //!
-//! In: tracks of boxes, the depth image, the frame's features. Out: for each track, the depths that move.
-
-use rand_pcg::Pcg32;
+//! In: boxes, the depth image, the frame's features. Out: for each track, the depths that move.
 
 use crate::config::DynamicConfig;
-use crate::detection::{BoundingBox, Detection};
-use crate::dynamic::Region;
-use crate::dynamic::body_mask::{BodyMask, CELL_PX};
-use crate::dynamic::depth_group::{DepthGroup, Grouping, largest_exact, largest_ransac};
-use crate::dynamic::tracks::{Track, Tracks};
+use crate::detection::BoundingBox;
+use crate::dynamic::body_depth::DepthGroups;
+use crate::dynamic::region::{Region, apply};
+use crate::dynamic::tracks::Tracks;
+use crate::dynamic::{DynamicFilter, Evidence};
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
 
-/// Step between the pixels that stand for the depth of a box, px.
-const SAMPLE_STEP: usize = 4;
-
-/// Finds the depth group of the body in each box. Buffers are reused.
+/// Follows boxes over time and cuts bodies out of them by depth.
 #[derive(Clone, Debug)]
-pub struct DepthGroups {
-    rng: Pcg32,
-    feature_depths: Vec<f32>,
-    pixel_depths: Vec<f32>,
-    depths_m: Vec<Option<f32>>,
+pub struct Yf {
+    tracks: Tracks,
+    groups: DepthGroups,
+    regions: Vec<Region>,
 }
 
-impl Default for DepthGroups {
-    fn default() -> Self {
-        Self::new(0)
-    }
-}
-
-impl DepthGroups {
+impl Yf {
     /// Draws start from `seed`.
     pub fn new(seed: u64) -> Self {
-        Self {
-            rng: Pcg32::new(seed, 0x5eed),
-            feature_depths: Vec::new(),
-            pixel_depths: Vec::new(),
-            depths_m: Vec::new(),
-        }
+        Self { tracks: Tracks::default(), groups: DepthGroups::new(seed), regions: Vec::new() }
     }
 
-    /// The depth of the body in each box, m; `None` where nothing was measured.
-    pub fn depths_of(
-        &mut self,
-        config: &DynamicConfig,
-        boxes: &[Detection],
-        depth: &DepthImage,
-        features: &FrameFeatures,
-    ) -> &[Option<f32>] {
-        self.depths_m.clear();
-        for detection in boxes {
-            self.collect(&detection.bbox, depth, features);
-            let body = self.body_in_front(config).map(|group| self.center(&group));
-            self.depths_m.push(body);
-        }
-        &self.depths_m
-    }
-
-    /// Appends the moving region of each track to `out` and notes the body's depth in the track. A track that was missed and shows no
-    /// body at its depth any more is dropped.
-    pub fn regions(
-        &mut self,
-        config: &DynamicConfig,
-        tracks: &mut Tracks,
-        depth: &DepthImage,
-        features: &FrameFeatures,
-        out: &mut Vec<Region>,
-    ) {
+    /// Notes the moving region of each track, and the body's depth in the track. A track that was missed and shows no body at its depth
+    /// any more is dropped.
+    fn cut_out(&mut self, config: &DynamicConfig, depth: &DepthImage, features: &FrameFeatures) {
+        let Self { tracks, groups, regions } = self;
         tracks.list.retain_mut(|track| {
-            self.collect(&track.bbox, depth, features);
-            let group = match self.body(config, track) {
-                Some(group) => group,
+            let Some(center_m) = groups.body_of(config, track, depth, features) else {
                 // No valid depth: whatever is in a box that was just detected moves; an old box is given up.
-                None if track.misses == 0 => {
-                    out.push(Region { bbox: track.bbox, score: track.score, misses: 0, depth_m: None });
-                    return true;
+                if track.misses == 0 {
+                    regions.push(Region { bbox: track.bbox, score: track.score, misses: 0, depth_m: None });
                 }
-                None => return false,
+                return track.misses == 0;
             };
-            let center = self.center(&group);
-            track.depth_m = Some(center);
-            out.push(Region {
+            track.depth_m = Some(center_m);
+            regions.push(Region {
                 bbox: grown(&track.bbox, config.margin),
                 score: track.score,
                 misses: track.misses,
                 depth_m: Some([
-                    center - config.group_half_width_m - config.reach_m,
-                    center + config.group_half_width_m,
+                    center_m - config.group_half_width_m - config.reach_m,
+                    center_m + config.group_half_width_m,
                 ]),
             });
             true
         });
     }
-
-    /// Depth of the body of a track in what other bodies leave free of its box, m, and the share of the box that it fills.
-    pub fn body_in(&mut self, config: &DynamicConfig, track: &Track, bodies: &BodyMask) -> Option<(f32, f32)> {
-        self.feature_depths.clear();
-        self.pixel_depths.clear();
-        bodies.free_depths(&track.bbox, &mut self.pixel_depths);
-        self.pixel_depths.sort_unstable_by(f32::total_cmp);
-        let group = self.body(config, track)?;
-        let cells = track.bbox.area() / (CELL_PX * CELL_PX) as f32;
-        Some((self.center(&group), group.members as f32 / cells.max(1.0)))
-    }
-
-    /// Sorted depths of the features and of a grid of pixels inside a box.
-    fn collect(&mut self, bbox: &BoundingBox, depth: &DepthImage, features: &FrameFeatures) {
-        self.feature_depths.clear();
-        self.feature_depths
-            .extend(features.features.iter().filter(|f| bbox.contains(f.raw[0], f.raw[1])).filter_map(|f| f.depth_m));
-        self.feature_depths.sort_unstable_by(f32::total_cmp);
-        self.pixel_depths.clear();
-        let (x0, y0) = (bbox.x_min.max(0.0) as usize, bbox.y_min.max(0.0) as usize);
-        let (x1, y1) = (bbox.x_max.max(0.0) as usize, bbox.y_max.max(0.0) as usize);
-        for y in (y0..y1.min(depth.raw.height())).step_by(SAMPLE_STEP) {
-            let row = (x0..x1.min(depth.raw.width())).step_by(SAMPLE_STEP);
-            self.pixel_depths.extend(row.filter_map(|x| depth.metres(x, y)));
-        }
-        self.pixel_depths.sort_unstable_by(f32::total_cmp);
-    }
-
-    /// The depth group of a track's body. A track that knows its depth is looked for there first.
-    fn body(&mut self, config: &DynamicConfig, track: &Track) -> Option<DepthGroup> {
-        if let Some(z) = track.depth_m {
-            let reach = config.group_half_width_m + config.max_depth_step_m * (1 + track.misses) as f32;
-            let near = within(&self.pixel_depths, z - reach, z + reach);
-            let group = largest_exact(near, 2.0 * config.group_half_width_m);
-            if group.is_some_and(|g| self.is_body(config, &g)) {
-                return group;
-            }
-            if track.misses > 0 {
-                return None;
-            }
-        }
-        self.body_in_front(config)
-    }
-
-    /// The largest group of feature depths, as the paper has it, unless enough of the box's pixels lie in front of it: a box that is
-    /// mostly wall has its largest group behind the person. Then only what is in front is asked.
-    fn body_in_front(&mut self, config: &DynamicConfig) -> Option<DepthGroup> {
-        let width = 2.0 * config.group_half_width_m;
-        let mut group = match config.grouping {
-            Grouping::Ransac => largest_ransac(&self.feature_depths, width, &mut self.rng),
-            Grouping::Exact => largest_exact(&self.feature_depths, width),
-        }
-        .or_else(|| largest_exact(&self.pixel_depths, width))?;
-        loop {
-            let in_front = within(&self.pixel_depths, 0.0, group.near_m - config.group_gap_m);
-            match largest_exact(in_front, width) {
-                Some(nearer) if self.is_body(config, &nearer) => group = nearer,
-                _ => return Some(group),
-            }
-        }
-    }
-
-    /// Whether a group of pixel depths is a large enough part of the box.
-    fn is_body(&self, config: &DynamicConfig, group: &DepthGroup) -> bool {
-        group.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32
-    }
-
-    /// Median depth of the pixels of a group, m.
-    fn center(&self, group: &DepthGroup) -> f32 {
-        let inside = within(&self.pixel_depths, group.near_m, group.far_m);
-        inside.get(inside.len() / 2).copied().unwrap_or(0.5 * (group.near_m + group.far_m))
-    }
 }
 
-/// The part of `sorted` in [from, to].
-fn within(sorted: &[f32], from: f32, to: f32) -> &[f32] {
-    let start = sorted.partition_point(|z| *z < from);
-    let end = sorted.partition_point(|z| *z <= to).max(start);
-    &sorted[start..end]
+impl DynamicFilter for Yf {
+    fn before_pose(&mut self, config: &DynamicConfig, evidence: &Evidence<'_>, features: &mut FrameFeatures) {
+        let &Evidence { movable, depth, scale_factors, .. } = evidence;
+        self.regions.clear();
+        let depths = self.groups.depths_of(config, movable, depth, features);
+        self.tracks.update(config, config.max_misses, movable, depths, [depth.raw.width(), depth.raw.height()]);
+        self.cut_out(config, depth, features);
+        apply(config, &mut self.regions, depth, features, scale_factors);
+    }
+
+    fn regions(&self) -> &[Region] {
+        &self.regions
+    }
 }
 
 /// The box with its sides moved out by `share` of its size.

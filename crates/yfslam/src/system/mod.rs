@@ -13,7 +13,7 @@ use crate::camera::Camera;
 use crate::config::Config;
 use crate::detection::{Detection, Detector};
 use crate::detector_thread::DetectorThread;
-use crate::dynamic::{DynamicFilter, Evidence, FirstPose, Method};
+use crate::dynamic::{DynamicFilter, Evidence, FirstPose};
 use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
@@ -90,7 +90,7 @@ pub struct Slam {
     execution: Execution,
     state: TrackingState,
     anchors: Vec<Anchor>,
-    filter: DynamicFilter,
+    filter: Box<dyn DynamicFilter>,
     detector: Option<DetectorThread>,
     /// Indices of the classes that can move.
     movable_classes: Vec<usize>,
@@ -120,7 +120,7 @@ impl Slam {
         let config = Arc::new(config);
         let backend = Backend::new(sensor.clone(), config.clone(), Map::default());
         // A method that asks for no boxes needs no detector.
-        let detector = detector.filter(|_| config.dynamic.method != Method::None);
+        let detector = detector.filter(|_| config.dynamic.method.needs_boxes());
         let mut movable_classes = Vec::new();
         if let Some(detector) = &detector {
             let known = detector.class_names();
@@ -134,7 +134,7 @@ impl Slam {
             }
         }
         Ok(Self {
-            filter: DynamicFilter::new(config.dynamic.seed),
+            filter: config.dynamic.method.filter(config.dynamic.seed),
             detector: detector.map(DetectorThread::spawn).transpose()?,
             movable_classes,
             movable: Vec::new(),
@@ -211,6 +211,7 @@ impl Slam {
         let evidence = Evidence {
             movable: &self.movable,
             mask: frame.mask.as_deref(),
+            gray: &self.gray,
             depth: &frame.depth,
             scale_factors: &self.sensor.scale_factors,
         };
@@ -228,7 +229,7 @@ impl Slam {
                 let map = self.owner.map();
                 let estimated = self.tracker.estimate(&self.sensor, &self.config, map);
                 if estimated {
-                    sharpen(&mut self.filter, &mut self.tracker.current, &self.sensor, &self.config, map);
+                    sharpen(self.filter.as_mut(), &mut self.tracker.current, &self.sensor, &self.config, map);
                 }
                 estimated && self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers)
             }
@@ -243,7 +244,9 @@ impl Slam {
         self.owner.note(&mut self.tracker.sightings);
         if tracked {
             self.tracker.accept(self.owner.map());
-            self.filter.end_frame(&self.config.dynamic, frame.timestamp_ns, self.tracker.current.reference);
+            if let Some(tie) = self.tracker.current.reference {
+                self.filter.end_frame(&self.config.dynamic, frame.timestamp_ns, tie);
+            }
             if self.state != TrackingState::Tracking {
                 self.tracker.forget_motion();
             }
@@ -443,7 +446,13 @@ impl StageTimes {
 }
 
 /// Compares the frame with the map by its first pose; what turns out to move is dropped, and the pose refined without it.
-fn sharpen(filter: &mut DynamicFilter, current: &mut TrackedFrame, sensor: &SensorModel, config: &Config, map: &Map) {
+fn sharpen(
+    filter: &mut dyn DynamicFilter,
+    current: &mut TrackedFrame,
+    sensor: &SensorModel,
+    config: &Config,
+    map: &Map,
+) {
     let first = FirstPose { sensor, map, t_cam_world: &current.t_cam_world };
     if filter.after_pose(&config.dynamic, &first, &mut current.features) {
         current.drop_distrusted();

@@ -1,0 +1,17 @@
+//! Method `none`: every feature is trusted, as in ORB-SLAM2.
+
+use crate::config::DynamicConfig;
+use crate::dynamic::{DynamicFilter, Evidence, Region};
+use crate::features::FrameFeatures;
+
+/// Leaves the features as they come: trusted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoFilter;
+
+impl DynamicFilter for NoFilter {
+    fn before_pose(&mut self, _config: &DynamicConfig, _evidence: &Evidence<'_>, _features: &mut FrameFeatures) {}
+
+    fn regions(&self) -> &[Region] {
+        &[]
+    }
+}
