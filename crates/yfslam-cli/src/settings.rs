@@ -32,6 +32,12 @@ pub enum MethodArg {
     Boxes,
     /// YF-SLAM: inside a box the depth group of the body is dropped, the background stays.
     Yf,
+    /// DS-SLAM: people are dropped in frames in which anything on them moves against the epipolar geometry.
+    Ds,
+    /// DynaSLAM: people are dropped, and whatever stands nearer than earlier keyframes allow.
+    Dyna,
+    /// DMS-SLAM: features that do not move like their neighbours are dropped; needs no boxes.
+    Dms,
     /// Outlines of bodies in depth are dropped, and whatever else has moved since earlier views.
     Full,
 }
@@ -52,6 +58,9 @@ impl MethodArg {
             Self::None => Method::None,
             Self::Boxes => Method::Boxes,
             Self::Yf => Method::Yf,
+            Self::Ds => Method::Ds,
+            Self::Dyna => Method::Dyna,
+            Self::Dms => Method::Dms,
             Self::Full => Method::Full,
         }
     }
@@ -63,6 +72,11 @@ pub fn describe(method: Method) -> (&'static str, &'static str) {
         Method::None => ("none", "every feature is trusted"),
         Method::Boxes => ("boxes", "features in boxes of people are dropped"),
         Method::Yf => ("yf", "people are kept out, what is behind them stays"),
+        Method::Ds => ("ds", "people are kept out while anything on them moves, as in DS-SLAM"),
+        Method::Dyna => {
+            ("dyna", "people and what stands where earlier keyframes saw farther are kept out, as in DynaSLAM")
+        }
+        Method::Dms => ("dms", "features that do not move like their neighbours are dropped, as in DMS-SLAM"),
         Method::Full => ("full", "outlines of people and of whatever has moved are kept out"),
     }
 }

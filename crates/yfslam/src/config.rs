@@ -323,8 +323,9 @@ config_section! {
 config_section! {
     /// Keeping moving things out (YF-SLAM, section 3.3).
     DynamicConfig {
-        /// `none` (ORB-SLAM2), `boxes` (all features in boxes dropped), `yf` (the paper) or `full` (ours).
-        method: Method = Method::Yf,
+        /// `none` (ORB-SLAM2), `boxes` (all features in boxes dropped), `yf` (the paper), `ds` (DS-SLAM), `dyna` (DynaSLAM), `dms`
+        /// (DMS-SLAM) or `full` (ours).
+        method: Method = Method::Full,
         /// How the largest depth group is found: `ransac` (the paper, seeded) or `exact` (deterministic search).
         grouping: Grouping = Grouping::Exact,
         /// Names of the classes that can move.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use yfslam::config::{Config, FeatureConfig};
+use yfslam::dynamic::Method;
 use yfslam::features::{Features, OrbExtractor};
 use yfslam::image::{DepthImage, GrayImage, Image, RgbImage, gray_from_rgb};
 use yfslam::{BoundingBox, Camera, Detection, RgbdFrame, Slam};
@@ -50,11 +51,12 @@ fn texture(seed: u32) -> RgbImage {
 #[test]
 fn a_frame_that_is_no_keyframe_allocates_nothing() -> Result<(), Box<dyn Error>> {
     extraction_allocates_nothing_after_the_first_frame();
-    tracking_allocates_nothing_between_keyframes()
+    let methods = [Method::None, Method::Boxes, Method::Yf, Method::Ds, Method::Dyna, Method::Full];
+    methods.into_iter().try_for_each(tracking_allocates_nothing_between_keyframes)
 }
 
 /// A camera at rest before a wall, a person's box in the picture.
-fn tracking_allocates_nothing_between_keyframes() -> Result<(), Box<dyn Error>> {
+fn tracking_allocates_nothing_between_keyframes(method: Method) -> Result<(), Box<dyn Error>> {
     let camera = Camera {
         width: 640,
         height: 480,
@@ -67,7 +69,9 @@ fn tracking_allocates_nothing_between_keyframes() -> Result<(), Box<dyn Error>> 
         fps: 30.0,
         bf: 40.0,
     };
-    let mut slam = Slam::new(Config::default(), &camera, None)?;
+    let mut config = Config::default();
+    config.dynamic.method = method;
+    let mut slam = Slam::new(config, &camera, None)?;
     let mut raw = Image::new(640, 480);
     raw.data_mut().fill(9000u16);
     let bbox = BoundingBox { x_min: 100.0, y_min: 50.0, x_max: 250.0, y_max: 470.0 };
@@ -87,11 +91,11 @@ fn tracking_allocates_nothing_between_keyframes() -> Result<(), Box<dyn Error>> 
         assert!(tracked.t_world_cam.is_some());
         // The list of tracked frames grows by doubling: at 16, 32 and 64.
         if i > 20 && !tracked.is_keyframe && i != 32 {
-            assert_eq!(allocations, 0, "frame {i}");
+            assert_eq!(allocations, 0, "frame {i} of {method:?}");
             quiet += 1;
         }
     }
-    assert!(quiet > 20, "only {quiet} frames were no keyframes");
+    assert!(quiet > 20, "only {quiet} frames of {method:?} were no keyframes");
     Ok(())
 }
 

@@ -35,8 +35,8 @@ pub struct BenchArgs {
     #[arg(value_name = "SEQUENCE")]
     sequences: Vec<String>,
     /// Methods to compare.
-    #[arg(long, alias = "method", value_name = "METHOD,METHOD", value_delimiter = ',', default_value = "none,boxes,yf",
-          value_parser = ["none", "boxes", "yf", "full"])]
+    #[arg(long, alias = "method", value_name = "METHOD,METHOD", value_delimiter = ',', default_value = "none,boxes,yf,full",
+          value_parser = ["none", "boxes", "yf", "ds", "dyna", "dms", "full"])]
     methods: Vec<String>,
     /// Number of seeds: of the world if it is synthetic, else of the method's random draws.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = value_parser!(u64).range(1..=1000))]
@@ -44,7 +44,7 @@ pub struct BenchArgs {
     /// Number of frames of each sequence [default: all].
     #[arg(long, value_name = "N")]
     frames: Option<u32>,
-    /// Network that finds people, for methods `boxes` and `yf`: `embedded` or a file [default: synthetic worlds and boxes.json tell, else
+    /// Network that finds people, for methods that ask for boxes: `embedded` or a file [default: synthetic worlds and boxes.json tell, else
     /// embedded].
     #[arg(long, value_name = "FILE.onnx|embedded")]
     detector: Option<PathBuf>,

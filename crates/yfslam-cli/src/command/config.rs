@@ -18,7 +18,7 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct ConfigArgs {
-    /// How moving things are kept out [default: yf].
+    /// How moving things are kept out [default: full].
     #[arg(long, value_enum, value_name = "METHOD", help_heading = "System")]
     method: Option<MethodArg>,
     #[command(flatten)]

@@ -32,7 +32,7 @@ pub struct DemoArgs {
         value_enum,
         value_name = "METHOD,METHOD",
         value_delimiter = ',',
-        default_value = "none,boxes,yf"
+        default_value = "none,boxes,yf,full"
     )]
     methods: Vec<MethodArg>,
     /// Number of frames.

@@ -62,7 +62,7 @@ const MOMENTS_OF_EACH: usize = 3;
 pub struct RunArgs {
     #[command(flatten)]
     source: SourceArgs,
-    /// How moving things are kept out [default: yf]. Several methods are run side by side; the others are compared with the first.
+    /// How moving things are kept out [default: full]. Several methods are run side by side; the others are compared with the first.
     #[arg(
         long = "method",
         alias = "methods",

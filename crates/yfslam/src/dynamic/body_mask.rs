@@ -173,6 +173,63 @@ impl BodyMask {
         2 * (coarse / half) * self.columns + 2 * (coarse % half)
     }
 
+    /// How much nearer than `expected_m` the farthest thing in front of that depth is, m, among the cells within `radius_px` of a position,
+    /// and the variance of all depths there, m²; `None` if nothing is nearer.
+    pub fn step_behind(&self, [x, y]: [f32; 2], radius_px: f32, expected_m: f32) -> Option<(f32, f32)> {
+        let near = |v: f32, limit: usize| {
+            let cell = |v: f32| (v.max(0.0) as usize / CELL_PX).min(limit.saturating_sub(1));
+            cell(v - radius_px)..=cell(v + radius_px)
+        };
+        let (mut least, mut count, mut sum, mut squares) = (f32::INFINITY, 0.0f32, 0.0, 0.0);
+        for row in near(y, self.rows) {
+            for column in near(x, self.columns) {
+                let z = *self.depth_m.get(row * self.columns + column)?;
+                if z > 0.0 {
+                    (count, sum, squares) = (count + 1.0, sum + z, squares + z * z);
+                    if z < expected_m {
+                        least = least.min(expected_m - z);
+                    }
+                }
+            }
+        }
+        least.is_finite().then(|| (least, (squares / count - (sum / count).powi(2)).max(0.0)))
+    }
+
+    /// Marks the region around a position whose depths differ from its mean by at most `step_m`. Returns whether anything is new.
+    pub fn grow_from(&mut self, [x, y]: [f32; 2], step_m: f32) -> bool {
+        let (column, row) = (x.max(0.0) as usize / CELL_PX, y.max(0.0) as usize / CELL_PX);
+        if column >= self.columns || row >= self.rows {
+            return false;
+        }
+        let seed = row * self.columns + column;
+        let depth_m = self.depth_m[seed];
+        if depth_m <= 0.0 || self.owner[seed] != 0 {
+            return false;
+        }
+        self.body.clear();
+        self.body.push(Reached { cell: seed as u32, depth_m, gap: 0 });
+        self.owner[seed] = NO_TRACK;
+        let (mut sum, mut next) = (depth_m, 0);
+        while let Some(&Reached { cell, .. }) = self.body.get(next) {
+            next += 1;
+            let cell = cell as usize;
+            let column = cell % self.columns;
+            let left = (column > 0).then(|| cell - 1);
+            let right = (column + 1 < self.columns).then_some(cell + 1);
+            let up = cell.checked_sub(self.columns);
+            let down = Some(cell + self.columns).filter(|c| *c < self.depth_m.len());
+            for cell in [left, right, up, down].into_iter().flatten() {
+                let z = self.depth_m[cell];
+                if self.owner[cell] == 0 && z > 0.0 && (z - sum / self.body.len() as f32).abs() < step_m {
+                    self.owner[cell] = NO_TRACK;
+                    self.body.push(Reached { cell: cell as u32, depth_m: z, gap: 0 });
+                    sum += z;
+                }
+            }
+        }
+        true
+    }
+
     /// Takes back what was marked for a track.
     pub fn release(&mut self, track: usize) {
         let owner = owner(track);

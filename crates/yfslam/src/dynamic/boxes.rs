@@ -16,7 +16,7 @@ impl DynamicFilter for Boxes {
         self.regions.clear();
         let certain = evidence.movable.iter().filter(|d| d.score >= config.open_score);
         self.regions.extend(certain.map(|d| Region { bbox: d.bbox, score: d.score, misses: 0, depth_m: None }));
-        apply(config, &mut self.regions, evidence.depth, features, evidence.scale_factors);
+        apply(config, &mut self.regions, evidence.depth, features, evidence.sensor);
     }
 
     fn regions(&self) -> &[Region] {

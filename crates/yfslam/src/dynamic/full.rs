@@ -46,11 +46,11 @@ impl Full {
     /// the bodies of least confidence.
     fn distrust(&mut self, config: &DynamicConfig, evidence: &Evidence<'_>, features: &mut FrameFeatures) {
         let wanted = config.min_trusted.min(features.len());
-        if self.outlines.distrust(config.full.edge_px, evidence.scale_factors, features) >= wanted {
+        if self.outlines.distrust(config.full.edge_px, evidence.sensor, features) >= wanted {
             return;
         }
         self.regions.sort_by(|a, b| b.score.total_cmp(&a.score));
-        while self.outlines.distrust(0.0, evidence.scale_factors, features) < wanted {
+        while self.outlines.distrust(0.0, evidence.sensor, features) < wanted {
             let Some(dropped) = self.regions.pop() else { return };
             // Those of like confidence go together.
             self.regions.retain(|region| region.score > dropped.score);
@@ -103,12 +103,8 @@ impl DynamicFilter for Full {
         self.outlines.begin(evidence);
         self.outlines.outline(config, &mut self.groups, &mut self.tracks, 0.0);
         self.regions.clear();
-        self.regions.extend(self.tracks.list.iter().filter(|track| !track.ended).map(|track| Region {
-            bbox: track.bbox,
-            score: track.score,
-            misses: track.misses,
-            depth_m: track.depth_m.map(|z| [z - config.group_half_width_m, z + config.group_half_width_m]),
-        }));
+        let alive = self.tracks.list.iter().filter(|track| !track.ended);
+        self.regions.extend(alive.map(|track| track.region(config)));
         self.distrust(config, evidence, features);
     }
 
@@ -199,7 +195,7 @@ mod tests {
         let mut features = FrameFeatures::default();
         let mut show = |time_ns: i64, somebody: bool, boxes: &[Detection]| {
             let (depth, gray) = (room(somebody), Image::new(640, 480));
-            let evidence = Evidence { movable: boxes, mask: None, gray: &gray, depth: &depth, scale_factors: &[1.0] };
+            let evidence = Evidence { movable: boxes, mask: None, gray: &gray, depth: &depth, sensor: &sensor };
             full.before_pose(config, &evidence, &mut features);
             let carried = |full: &Full| full.tracks.list.iter().filter(|track| !track.ended).count();
             let before = carried(&full);

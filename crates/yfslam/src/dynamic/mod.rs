@@ -7,6 +7,9 @@ mod body_depth;
 mod body_mask;
 mod boxes;
 pub mod depth_group;
+mod dms;
+mod ds;
+mod dyna;
 mod full;
 mod none;
 mod outline;
@@ -35,9 +38,15 @@ pub enum Method {
     /// Every feature inside a box is dropped.
     Boxes,
     /// YF-SLAM: inside a box, the depth group of the body is dropped and the background stays.
-    #[default]
     Yf,
+    /// DS-SLAM: people are dropped while anything on them moves against the epipolar geometry.
+    Ds,
+    /// DynaSLAM: people are dropped, and what stands where earlier keyframes saw farther.
+    Dyna,
+    /// DMS-SLAM: features whose motion their neighbours do not share are dropped; no detector.
+    Dms,
     /// Outlines of bodies in depth, and whatever has moved since earlier views.
+    #[default]
     Full,
 }
 
@@ -51,8 +60,8 @@ pub struct Evidence<'a> {
     pub gray: &'a GrayImage,
     /// The depth image.
     pub depth: &'a DepthImage,
-    /// Scales of the pyramid's levels.
-    pub scale_factors: &'a [f32],
+    /// The camera, and the scales of the pyramid's levels.
+    pub sensor: &'a SensorModel,
 }
 
 /// A first pose, and what it can be compared with.
@@ -75,13 +84,16 @@ impl Method {
             Self::None => Box::new(none::NoFilter),
             Self::Boxes => Box::<boxes::Boxes>::default(),
             Self::Yf => Box::new(yf::Yf::new(seed)),
+            Self::Ds => Box::new(ds::Ds::new(seed)),
+            Self::Dyna => Box::new(dyna::Dyna::new(seed)),
+            Self::Dms => Box::<dms::Dms>::default(),
             Self::Full => Box::new(full::Full::new(seed)),
         }
     }
 
     /// Whether boxes of movable objects tell it anything.
     pub fn needs_boxes(self) -> bool {
-        self != Self::None
+        !matches!(self, Self::None | Self::Dms)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::dynamic::body_depth::DepthGroups;
 use crate::dynamic::body_mask::BodyMask;
 use crate::dynamic::tracks::Tracks;
 use crate::features::FrameFeatures;
+use crate::sensor::SensorModel;
 
 /// Outlines the bodies of a frame. Buffers are reused.
 #[derive(Clone, Debug, Default)]
@@ -62,11 +63,10 @@ impl Outlines {
     }
 
     /// Distrusts what lies on a body or within `edge_px`, at the finest level, of one; the rest is trusted. Returns how many are.
-    pub fn distrust(&self, edge_px: f32, scale_factors: &[f32], features: &mut FrameFeatures) -> usize {
+    pub fn distrust(&self, edge_px: f32, sensor: &SensorModel, features: &mut FrameFeatures) -> usize {
         let mut trusted = 0;
         for f in &mut features.features {
-            let scale = scale_factors.get(usize::from(f.octave)).copied().unwrap_or(1.0);
-            f.trust = if self.bodies.covers(f.raw, edge_px * scale) { 0.0 } else { 1.0 };
+            f.trust = if self.bodies.covers(f.raw, edge_px * sensor.scale(f.octave)) { 0.0 } else { 1.0 };
             trusted += usize::from(f.trust > 0.0);
         }
         trusted

@@ -4,6 +4,7 @@ use crate::config::DynamicConfig;
 use crate::detection::BoundingBox;
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
+use crate::sensor::SensorModel;
 
 /// A part of the image that was found to move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,14 +26,13 @@ pub fn apply(
     regions: &mut Vec<Region>,
     depth: &DepthImage,
     features: &mut FrameFeatures,
-    scale_factors: &[f32],
+    sensor: &SensorModel,
 ) {
     regions.sort_by(|a, b| b.score.total_cmp(&a.score));
     loop {
         let mut trusted = 0;
         for f in &mut features.features {
-            let scale = scale_factors.get(usize::from(f.octave)).copied().unwrap_or(1.0);
-            let moving = regions.iter().any(|r| r.covers(depth, f.raw, config.edge_px * scale));
+            let moving = regions.iter().any(|r| r.covers(depth, f.raw, config.edge_px * sensor.scale(f.octave)));
             f.trust = if moving { 0.0 } else { 1.0 };
             trusted += usize::from(!moving);
         }

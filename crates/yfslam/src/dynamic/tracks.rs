@@ -5,6 +5,7 @@
 
 use crate::config::DynamicConfig;
 use crate::detection::{BoundingBox, Detection};
+use crate::dynamic::Region;
 
 /// A movable object followed in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,6 +93,12 @@ impl Tracks {
 }
 
 impl Track {
+    /// Its box, with the depths of the body.
+    pub fn region(&self, config: &DynamicConfig) -> Region {
+        let depth_m = self.depth_m.map(|z| [z - config.group_half_width_m, z + config.group_half_width_m]);
+        Region { bbox: self.bbox, score: self.score, misses: self.misses, depth_m }
+    }
+
     fn follow(&mut self, detection: &Detection) {
         let (from, to) = (center(&self.bbox), center(&detection.bbox));
         // The box was already moved by the old velocity: what is left is the error of the prediction. Half of it is believed.

@@ -32,6 +32,8 @@ pub struct Views {
     /// Direction of each cell, x and y at depth 1, lens distortion removed.
     rays: Vec<[f32; 2]>,
     ring: VecDeque<View>,
+    /// Buffers for views to come: made at the start, so that no later frame has to.
+    spare: Vec<Vec<f32>>,
     /// Depth that a view predicts for each cell, m; infinite where it says nothing.
     predicted_m: Vec<f32>,
     nearer: Vec<u8>,
@@ -50,11 +52,8 @@ impl Views {
 
     /// Keeps a frame: depths of its cells, 0 where it is unknown or moves.
     pub fn keep(&mut self, config: &FullConfig, timestamp_ns: i64, tie: Tie, depth_m: &[f32]) {
-        let mut buffer = if self.ring.len() >= config.views {
-            self.ring.pop_front().map_or_else(Vec::new, |view| view.depth_m)
-        } else {
-            Vec::new()
-        };
+        let oldest = if self.ring.len() >= config.views { self.ring.pop_front() } else { None };
+        let mut buffer = oldest.map(|view| view.depth_m).or_else(|| self.spare.pop()).unwrap_or_default();
         buffer.clear();
         buffer.extend_from_slice(depth_m);
         self.ring.push_back(View { timestamp_ns, tie, depth_m: buffer });
@@ -62,13 +61,13 @@ impl Views {
 
     /// Forgets all.
     pub fn clear(&mut self) {
-        self.ring.clear();
+        self.spare.extend(self.ring.drain(..).map(|view| view.depth_m));
     }
 
     /// Compares the depths of the frame's cells with all views that tell something about them.
     pub fn compare_all(&mut self, config: &FullConfig, first: &FirstPose<'_>, depth_m: &[f32]) {
         let FirstPose { sensor, map, t_cam_world } = *first;
-        self.prepare(sensor);
+        self.prepare(config, sensor);
         self.nearer.clear();
         self.nearer.resize(depth_m.len(), 0);
         self.alike.clear();
@@ -96,7 +95,7 @@ impl Views {
         (same.max(nearer) >= 2).then_some(same > nearer)
     }
 
-    fn prepare(&mut self, sensor: &SensorModel) {
+    fn prepare(&mut self, config: &FullConfig, sensor: &SensorModel) {
         if !self.rays.is_empty() {
             return;
         }
@@ -109,6 +108,11 @@ impl Views {
                 self.rays.push([x as f32, y as f32]);
             }
         }
+        let missing = config.views.saturating_sub(self.ring.len() + self.spare.len());
+        self.ring.reserve(missing);
+        self.component.reserve(self.rays.len());
+        self.spare.reserve(config.views);
+        self.spare.extend((0..missing).map(|_| Vec::with_capacity(self.rays.len())));
     }
 
     /// The cell of a direction, if it is in the picture.

@@ -54,12 +54,12 @@ impl Yf {
 
 impl DynamicFilter for Yf {
     fn before_pose(&mut self, config: &DynamicConfig, evidence: &Evidence<'_>, features: &mut FrameFeatures) {
-        let &Evidence { movable, depth, scale_factors, .. } = evidence;
+        let &Evidence { movable, depth, sensor, .. } = evidence;
         self.regions.clear();
         let depths = self.groups.depths_of(config, movable, depth, features);
         self.tracks.update(config, config.max_misses, movable, depths, [depth.raw.width(), depth.raw.height()]);
         self.cut_out(config, depth, features);
-        apply(config, &mut self.regions, depth, features, scale_factors);
+        apply(config, &mut self.regions, depth, features, sensor);
     }
 
     fn regions(&self) -> &[Region] {

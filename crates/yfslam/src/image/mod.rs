@@ -1,12 +1,14 @@
 //! Image buffers: row-major, tightly packed, top row first.
 
 mod blur;
+mod flow;
 mod gray;
 pub(crate) mod kernels;
 pub(crate) mod plane;
 mod pyramid;
 
 pub(crate) use blur::{BLUR_RADIUS, blur};
+pub(crate) use flow::Flow;
 pub use gray::gray_from_rgb;
 pub(crate) use plane::{LANES, Plane};
 pub(crate) use pyramid::Pyramid;

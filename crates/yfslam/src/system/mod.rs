@@ -213,7 +213,7 @@ impl Slam {
             mask: frame.mask.as_deref(),
             gray: &self.gray,
             depth: &frame.depth,
-            scale_factors: &self.sensor.scale_factors,
+            sensor: &self.sensor,
         };
         self.filter.before_pose(&self.config.dynamic, &evidence, features);
         times.dynamic = clock.lap();

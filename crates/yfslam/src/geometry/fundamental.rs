@@ -1,0 +1,127 @@
+//! The fundamental matrix between two pictures (Hartley and Zisserman, Multiple View Geometry, sections 11.2 and 11.6).
+//!
+//! In: positions of the same points in both. Out: the matrix F with x₂ᵀ F x₁ = 0 for points that keep still, by RANSAC.
+
+use nalgebra::{Matrix3, SMatrix, SymmetricEigen, Vector3};
+use rand_pcg::Pcg32;
+use rand_pcg::rand_core::Rng;
+
+/// A position in the first picture and in the second, px.
+pub type Pair = ([f32; 2], [f32; 2]);
+
+/// Draws at most.
+const MAX_DRAWS: f64 = 500.0;
+
+/// F that most pairs fit within `limit_px` of their epipolar line, sought until it is found with `confidence`; `None` for fewer than
+/// eight pairs.
+pub fn fundamental_ransac(pairs: &[Pair], limit_px: f64, confidence: f64, rng: &mut Pcg32) -> Option<Matrix3<f64>> {
+    if pairs.len() < 8 {
+        return None;
+    }
+    let mut best: Option<(usize, Matrix3<f64>)> = None;
+    let (mut draws, mut wanted) = (0.0, MAX_DRAWS);
+    while draws < wanted {
+        draws += 1.0;
+        let picked: [Pair; 8] =
+            std::array::from_fn(|_| pairs[((u64::from(rng.next_u32()) * pairs.len() as u64) >> 32) as usize]);
+        let Some(f) = eight_point(picked.iter().copied()) else { continue };
+        let inliers = pairs.iter().filter(|pair| epipolar_distance(&f, pair) <= limit_px).count();
+        if best.is_none_or(|(most, _)| inliers > most) {
+            best = Some((inliers, f));
+            let share = inliers as f64 / pairs.len() as f64;
+            // No draw of still points alone was met yet if nothing fits: the logarithm of 1 must not turn the sign.
+            let per_draw = (-share.powi(8).min(1.0 - 1e-12)).ln_1p().min(-1e-12);
+            wanted = ((1.0 - confidence).ln() / per_draw).clamp(1.0, MAX_DRAWS);
+        }
+    }
+    let (_, f) = best?;
+    // Fewer than eight leave the matrix as it is.
+    let fitting = pairs.iter().filter(|pair| epipolar_distance(&f, pair) <= limit_px).copied();
+    eight_point(fitting).or(Some(f))
+}
+
+/// Distance of the second position from the epipolar line of the first, px.
+pub fn epipolar_distance(f: &Matrix3<f64>, ([x1, y1], [x2, y2]): &Pair) -> f64 {
+    let line = f * Vector3::new(f64::from(*x1), f64::from(*y1), 1.0);
+    let length = line.x.hypot(line.y);
+    (line.x * f64::from(*x2) + line.y * f64::from(*y2) + line.z).abs() / length.max(1e-12)
+}
+
+/// The normalised eight-point algorithm; `None` if the pairs do not determine F.
+pub fn eight_point(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f64>> {
+    if pairs.clone().count() < 8 {
+        return None;
+    }
+    let to_unit_1 = normalisation(pairs.clone().map(|pair| pair.0))?;
+    let to_unit_2 = normalisation(pairs.clone().map(|pair| pair.1))?;
+    let mut normal = SMatrix::<f64, 9, 9>::zeros();
+    for ([x1, y1], [x2, y2]) in pairs {
+        let a = to_unit_1 * Vector3::new(f64::from(x1), f64::from(y1), 1.0);
+        let b = to_unit_2 * Vector3::new(f64::from(x2), f64::from(y2), 1.0);
+        let row = SMatrix::<f64, 9, 1>::from([b.x * a.x, b.x * a.y, b.x, b.y * a.x, b.y * a.y, b.y, a.x, a.y, 1.0]);
+        normal += row * row.transpose();
+    }
+    let eigen = SymmetricEigen::new(normal);
+    let f = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+    let mut svd = Matrix3::from_row_slice(f.as_slice()).svd(true, true);
+    let smallest = svd.singular_values.imin();
+    svd.singular_values[smallest] = 0.0;
+    let f = svd.recompose().ok()?;
+    let f = to_unit_2.transpose() * f * to_unit_1;
+    f.iter().all(|v| v.is_finite()).then_some(f)
+}
+
+/// Moves the mean of positions to 0 and their mean distance from it to √2.
+fn normalisation(positions: impl Iterator<Item = [f32; 2]> + Clone) -> Option<Matrix3<f64>> {
+    let count = positions.clone().count() as f64;
+    let (sx, sy) = positions.clone().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p[0]), y + f64::from(p[1])));
+    let (mx, my) = (sx / count, sy / count);
+    let spread: f64 = positions.map(|p| (f64::from(p[0]) - mx).hypot(f64::from(p[1]) - my)).sum::<f64>() / count;
+    let s = std::f64::consts::SQRT_2 / spread;
+    (spread > 1e-9).then(|| Matrix3::new(s, 0.0, -s * mx, 0.0, s, -s * my, 0.0, 0.0, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Isometry3, Point3};
+    use proptest::prelude::*;
+
+    fn project(p: Point3<f64>) -> [f32; 2] {
+        [(520.0 * p.x / p.z + 320.0) as f32, (520.0 * p.y / p.z + 240.0) as f32]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        #[test]
+        fn points_that_keep_still_fit_and_others_do_not(
+            points in prop::collection::vec((-2f64..2.0, -1.5f64..1.5, 2f64..6.0), 60..90),
+            shift in prop::array::uniform3(0.05f64..0.2),
+            turn in prop::array::uniform3(-0.05f64..0.05),
+        ) {
+            let motion = Isometry3::new(shift.into(), turn.into());
+            let mut pairs: Vec<Pair> = points
+                .iter()
+                .map(|&(x, y, z)| Point3::new(x, y, z))
+                .map(|p| (project(p), project(motion * p)))
+                .collect();
+            let f = fundamental_ransac(&pairs, 0.1, 0.99, &mut Pcg32::new(1, 2)).unwrap();
+            prop_assert!(pairs.iter().filter(|pair| epipolar_distance(&f, pair) < 0.1).count() > pairs.len() * 9 / 10);
+            // A quarter of the points walks away by itself.
+            let walkers = pairs.len() / 4;
+            for (k, pair) in pairs.iter_mut().take(walkers).enumerate() {
+                pair.1[k % 2] += 12.0;
+            }
+            let f = fundamental_ransac(&pairs, 0.1, 0.99, &mut Pcg32::new(1, 2)).unwrap();
+            let off = |pairs: &[Pair]| pairs.iter().filter(|pair| epipolar_distance(&f, pair) > 1.0).count();
+            prop_assert!(off(&pairs[walkers..]) < pairs.len() / 6, "{} {}", off(&pairs[walkers..]), off(&pairs[..walkers]));
+            prop_assert!(off(&pairs[..walkers]) > walkers / 2);
+        }
+    }
+
+    #[test]
+    fn too_few_pairs_make_no_matrix() {
+        let pairs = [([1.0, 2.0], [3.0, 4.0]); 7];
+        assert_eq!(fundamental_ransac(&pairs, 0.1, 0.99, &mut Pcg32::new(1, 2)), None);
+    }
+}
