@@ -16,7 +16,7 @@ fn actors(spec: &str) -> (Actors, WorldConfig) {
 }
 
 /// Way, task and poses of person 0 at a time.
-fn walker(actors: &Actors, index: usize) -> (&Person, &Walkway, Task) {
+fn walker(actors: &Actors, index: usize) -> (&Person, &Way, Task) {
     let person = &actors.people[index];
     match &person.plan {
         Plan::Walk(way, task) => (person, way, *task),
@@ -173,12 +173,17 @@ fn what_is_displaced_unseen_is_out_of_view_before_and_after_and_ends_elsewhere()
 
 #[test]
 fn nobody_walks_through_anybody() {
-    for spec in ["walking_xyz?seed=2&people=6&share=0.5", "walking_xyz?seed=3&people=4&robots=2&carry=on&chair=on"] {
+    for spec in [
+        "walking_xyz?seed=2&people=6&share=0.5",
+        "walking_xyz?seed=3&people=4&robots=2&carry=on&chair=on",
+        "corridor_loop?seed=1&people=6",
+    ] {
         let (mut actors, config) = actors(spec);
         let scene = Scene::new(config.scene, config.seed);
+        let path = CameraPath::new(&config, &scene);
         for closeness in [0.3, 1.0, 2.0] {
-            actors.set_closeness(&scene, &config, closeness);
-            let ways: Vec<&Walkway> = (0..config.people).map(|k| walker(&actors, k).1).collect();
+            actors.set_closeness(&scene, &config, &path, closeness);
+            let ways: Vec<&Way> = (0..config.people).map(|k| walker(&actors, k).1).collect();
             for i in 0..1200 {
                 let time = f64::from(i) / 10.0;
                 let places: Vec<[f64; 2]> = ways.iter().map(|way| way.at(time).position).collect();

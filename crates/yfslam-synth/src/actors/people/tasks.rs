@@ -2,12 +2,13 @@
 //!
 //! In: where a walker is on the way. Out: the walker's bend, turn and arms, and the pose of the thing. The box visits the two
 //! stops P and Q (in walking order) in a cycle of three rounds: fetched at P, put down at Q, left there, fetched at Q, put
-//! down at P, left there.
+//! down at P, left there. Who walks along the camera's tour does not stop, and holds it all the time.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
 use super::skeleton::{self, BonePoses, Joints, Proportions};
 use super::{gait, smooth, upright};
+use crate::actors::rounds::Way;
 use crate::actors::walkway::{Step, Walkway};
 use crate::mesh::Vec3;
 
@@ -51,7 +52,7 @@ enum Handling {
 
 impl Task {
     /// Bends the walker as the task asks for; returns the turn relative to the way if the task decides on it.
-    pub fn prepare(self, way: &Walkway, step: &Step, joints: &mut Joints) -> Option<f32> {
+    pub fn prepare(self, way: &Way, step: &Step, joints: &mut Joints) -> Option<f32> {
         match self {
             Self::Nothing => None,
             Self::Push => {
@@ -59,6 +60,7 @@ impl Task {
                 Some(0.0)
             }
             Self::Carry => {
+                let Way::Around(way) = way else { return None };
                 let (turned, bent) = match handling(way, step) {
                     Handling::Fetched(_, t) | Handling::PutDown(_, t) => (turned(t), bent(t)),
                     _ => return None,
@@ -70,12 +72,16 @@ impl Task {
     }
 
     /// Puts the hands where the task needs them.
-    pub fn hands(self, way: &Walkway, step: &Step, p: &Proportions, poses: &mut BonePoses) {
+    pub fn hands(self, way: &Way, step: &Step, p: &Proportions, poses: &mut BonePoses) {
         let (thing, grip, firm) = match self {
             Self::Nothing => return,
             Self::Push => (chair(step), CHAIR_GRIP_M, 1.0),
             Self::Carry => {
-                let firm = match handling(way, step) {
+                let handling = match way {
+                    Way::Around(way) => handling(way, step),
+                    Way::Along(_) => Handling::Held,
+                };
+                let firm = match handling {
                     Handling::Held => 1.0,
                     Handling::Left(_) => return,
                     Handling::Fetched(_, t) => {
@@ -111,15 +117,15 @@ pub fn chair(step: &Step) -> Isometry3<f32> {
 }
 
 /// Pose of the box: the middle of its bottom, in the hands of the one whose bones are given, or on the floor.
-pub fn carried_box(way: &Walkway, step: &Step, poses: &BonePoses) -> Isometry3<f32> {
+pub fn carried_box(way: &Way, step: &Step, poses: &BonePoses) -> Isometry3<f32> {
     // The hips' own turn and roll are left out: hands keep a box level.
     let hips = poses[0].translation.vector;
-    let held = |turned: f32| {
-        upright([hips.x, hips.y], hips.z, step.heading as f32 + inwards(way) * turned)
-            * Translation3::new(0.0, HOLD_M[0], HOLD_M[1])
+    let held = |turn: f32| {
+        upright([hips.x, hips.y], hips.z, step.heading as f32 + turn) * Translation3::new(0.0, HOLD_M[0], HOLD_M[1])
     };
+    let Way::Around(way) = way else { return held(0.0) };
     let between = |stop: usize, t: f32| {
-        let (from, to, share) = (held(turned(t)), left_at(way, stop), bent(t));
+        let (from, to, share) = (held(inwards(way) * turned(t)), left_at(way, stop), bent(t));
         Isometry3::from_parts(
             Translation3::from(from.translation.vector.lerp(&to.translation.vector, share)),
             from.rotation.nlerp(&to.rotation, share),
