@@ -73,6 +73,22 @@ impl SceneKind {
         [("office", Self::Office), ("rescue", Self::Rescue), ("corridor", Self::Corridor), ("lab", Self::Lab)];
 }
 
+/// What someone carries, puts down and fetches again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CarriedObject {
+    /// A cardboard box of 36 cm × 26 cm × 24 cm.
+    #[default]
+    Box,
+    /// An open laptop, 34 cm wide, switched off: its screen is too dark for the depth sensor from some distance on.
+    Laptop,
+}
+
+impl CarriedObject {
+    /// All objects with their names in specs.
+    pub const ALL: [(&str, Self); 2] = [("box", Self::Box), ("laptop", Self::Laptop)];
+}
+
 /// A synthetic sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -141,8 +157,10 @@ pub struct ActorsConfig {
     pub robots: usize,
     /// Whether a walking person pushes a chair around: the first one who carries nothing.
     pub pushed_chair: bool,
-    /// Whether the first walking person carries a box, puts it down, leaves it there and fetches it again.
+    /// Whether the first walking person carries something, puts it down, leaves it there and fetches it again.
     pub carried_box: bool,
+    /// What that is; a box unless `carried_box` is on.
+    pub carried_object: CarriedObject,
     /// Whether a box is displaced while it and its new place are out of the camera's view. If that never happens within
     /// the sequence, it stays where it is.
     pub moved_object: bool,
@@ -308,6 +326,8 @@ impl WorldConfig {
             self.people,
             "at least as many as push a chair or carry a box, and they must walk (activity `walking`)",
         )?;
+        let nobody_carries = !actors.carried_box && actors.carried_object != CarriedObject::Box;
+        check(!nobody_carries, "actors.carried_object", "not a box", "left out unless `carried_box` is on")?;
         check((0.0..=0.8).contains(&self.person_share), "person_share", self.person_share, "between 0 and 0.8")?;
         check((1..=1_000_000).contains(&self.frames), "frames", self.frames, "between 1 and 1000000")?;
         check(size.contains(&camera.width), "camera.width", camera.width, "between 16 and 4096 px")?;

@@ -1,7 +1,7 @@
 //! All that moves: people, robots, and things that are pushed, carried or displaced.
 //!
 //! In: a scene, a configuration and a seed. Out: at any time, everyone's posed meshes and the spheres that shade their
-//! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried box, displaced box. What
+//! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried object, displaced box. What
 //! nobody can move (desks, the chairs of the scene) is no actor.
 
 pub mod companion;
@@ -17,7 +17,7 @@ pub mod walkway;
 use yfslam::Camera;
 
 use crate::camera_path::CameraPath;
-use crate::config::{Activity, WorldConfig};
+use crate::config::{Activity, CarriedObject, WorldConfig};
 use crate::light::{Lights, Occluder};
 use crate::mesh::{Mesh, Vec3};
 use crate::scene::Scene;
@@ -30,7 +30,7 @@ use rounds::{Way, way};
 use thing::Thing;
 
 /// Names of the classes of actors, by the class of a [`SynthFrame`](crate::SynthFrame)'s boxes and detections.
-pub const CLASS_NAMES: [&str; 4] = ["person", "robot", "chair", "box"];
+pub const CLASS_NAMES: [&str; 5] = ["person", "robot", "chair", "box", "laptop"];
 
 /// What an actor is; the value is the index into [`CLASS_NAMES`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +39,7 @@ pub enum Class {
     Robot,
     Chair,
     Box,
+    Laptop,
 }
 
 /// Where a thing is.
@@ -74,9 +75,11 @@ impl Actors {
             actors.add(Motion::Handled(pusher), |instance| Thing::chair(instance, &mut scene.palette, config.seed));
         }
         if let Some(carrier) = rounds::carrier(config) {
-            let size = Vec3::from(tasks::BOX_M);
-            actors.add(Motion::Handled(carrier), |instance| {
-                Thing::cardboard(instance, &mut scene.palette, size, config.seed)
+            actors.add(Motion::Handled(carrier), |instance| match wanted.carried_object {
+                CarriedObject::Box => Thing::cardboard(instance, &mut scene.palette, tasks::BOX_M.into(), config.seed),
+                CarriedObject::Laptop => {
+                    Thing::laptop(instance, &mut scene.palette, tasks::LAPTOP_M.into(), config.seed)
+                }
             });
         }
         if wanted.moved_object {
@@ -144,7 +147,7 @@ impl Actors {
                     upright(step.position.map(|v| v as f32), 0.0, (step.heading + step.glance) as f32)
                 }
                 Motion::Handled(by) => match &self.people[*by].plan {
-                    Plan::Walk(way, Task::Carry) => tasks::carried_box(way, &way.at(time), &poses[*by]),
+                    Plan::Walk(way, Task::Carry(object)) => tasks::carried(*object, way, &way.at(time), &poses[*by]),
                     Plan::Walk(way, _) => tasks::chair(&way.at(time)),
                     _ => continue,
                 },
@@ -162,7 +165,7 @@ fn plan(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize) -> Pla
     let walk = || {
         let task = match k {
             _ if rounds::pusher(config) == Some(k) => Task::Push,
-            _ if rounds::carrier(config) == Some(k) => Task::Carry,
+            _ if rounds::carrier(config) == Some(k) => Task::Carry(config.actors.carried_object),
             _ => Task::Nothing,
         };
         Plan::Walk(way(scene, config, path, k, 0.5), task)

@@ -3,7 +3,6 @@
 use nalgebra::{Isometry3, Point3};
 
 use super::people::skeleton::{self, Bone};
-use super::people::tasks::BOX_M;
 use super::*;
 use crate::camera_path::CameraPath;
 use crate::spec::parse;
@@ -29,35 +28,37 @@ fn distance(a: &Isometry3<f32>, b: &Isometry3<f32>) -> f32 {
 }
 
 #[test]
-fn a_carried_box_is_in_both_hands_never_jumps_and_stays_where_it_was_put_until_fetched() {
-    for seed in 1..4 {
-        let (actors, _) = actors(&format!("walking_static?seed={seed}&people=2&carry=on"));
+fn what_is_carried_is_in_both_hands_never_jumps_and_stays_where_it_was_put_until_fetched() {
+    for (seed, (name, object)) in (1..4).flat_map(|seed| CarriedObject::ALL.map(|object| (seed, object))) {
+        let (actors, _) = actors(&format!("walking_static?seed={seed}&people=2&carry=on&object={name}"));
+        assert_eq!(CLASS_NAMES[actors.class(3) as usize], name);
+        let grip = tasks::grip_m(object);
         let (person, way, task) = walker(&actors, 0);
-        assert_eq!(task, Task::Carry);
+        assert_eq!(task, Task::Carry(object));
         let dt = 1.0 / 30.0;
         let frames: Vec<_> = (0..4500)
             .map(|i| {
                 let time = f64::from(i) * dt;
                 let poses = person.poses(time);
-                let carried = tasks::carried_box(way, &way.at(time), &poses);
+                let carried = tasks::carried(object, way, &way.at(time), &poses);
                 (carried, [0, 1].map(|side| skeleton::palm(&poses, &person.body.proportions, side)))
             })
             .collect();
         let (mut lifted, mut landed, mut rest_places) = (0, 0, Vec::<Isometry3<f32>>::new());
         for pair in frames.windows(2) {
             let (before, (now, palms)) = (&pair[0].0, &pair[1]);
-            assert!(distance(before, now) < 0.08, "the box jumps by {} m", distance(before, now));
+            assert!(distance(before, now) < 0.08, "the {name} jumps by {} m", distance(before, now));
             let on_floor = |pose: &Isometry3<f32>| pose.translation.z.abs() < 1e-5;
             if !on_floor(now) {
                 lifted += 1;
                 for palm in palms {
                     let local = now.inverse() * Point3::from(*palm);
-                    let gap = (local.x.abs() - BOX_M[0] / 2.0).abs();
-                    assert!(gap < 0.03 && local.y.abs() < 0.05, "a hand is at {local} of the box it carries");
+                    let gap = Vec3::new(local.x.abs(), local.y, local.z) - Vec3::from(grip);
+                    assert!(gap.norm() < 0.03, "seed {seed}: a hand is at {local} of the {name} it carries");
                 }
             } else if on_floor(before) {
                 let slid = distance(before, now);
-                assert!(slid < 1e-5, "the box slides by {slid} m on the floor");
+                assert!(slid < 1e-5, "the {name} slides by {slid} m on the floor");
                 landed += 1;
                 if rest_places.iter().all(|place| distance(place, now) > 1e-4) {
                     rest_places.push(*now);
@@ -65,7 +66,7 @@ fn a_carried_box_is_in_both_hands_never_jumps_and_stays_where_it_was_put_until_f
             }
         }
         assert!(lifted > 300 && landed > 300, "carried for {lifted}, left for {landed} frames");
-        assert_eq!(rest_places.len(), 2, "the box rests at two places");
+        assert_eq!(rest_places.len(), 2, "the {name} rests at two places");
     }
 }
 
