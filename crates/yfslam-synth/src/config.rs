@@ -215,7 +215,8 @@ pub struct SensorConfig {
     /// Depth noise that grows with distance, 1/m: the second term there (b = 0.0019 /m).
     pub depth_noise_growth: f32,
     /// Depth noise at steep angles θ of the surface, m^1.5: the factor of θ² / (π/2 − θ)² / √z, which is added above 60° (same paper,
-    /// eq. 3: 0.0001).
+    /// eq. 3: 0.0001). The paper itself was not at hand for this term: formula and factor agree with open implementations that cite
+    /// it, and that the two terms above hold alone between 10° and 60° with what others say of it.
     pub depth_noise_angle: f32,
     /// Step of the disparity in px of a structured-light sensor (1/8 for the Kinect: Khoshelham and Elberink,
     /// Sensors 2012, section 3); the depth step is z² · step / bf.
@@ -223,7 +224,7 @@ pub struct SensorConfig {
     /// Whether places that the projector cannot see, and depth edges, have no depth.
     pub holes: bool,
     /// Angle between the surface's normal and the ray beyond which there is no depth, degrees; 90 measures at any angle. The
-    /// default is a choice of ours: little of the projected light comes back from steeper surfaces.
+    /// default is a choice of ours, from no measurement: little of the projected light comes back from steeper surfaces.
     pub max_angle_deg: f32,
     /// Least light that comes back, as reflectance · cos θ / z², 1/m²; darker places have no depth; 0 measures them all. The default
     /// loses black cloth and screens (reflectance 0.04) beyond 2.8 m and keeps grey walls over the whole range.
