@@ -39,7 +39,8 @@ impl CameraMotion {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Activity {
-    /// They walk around the desk, all the same way and two abreast, stop, turn and walk on.
+    /// They walk around the desk, all the same way and two abreast, stop, turn and walk on. Where a camera on a tour leaves no room
+    /// for that (the corridor), they walk the tour: every second one ahead of the camera, the others towards it and past it.
     Walking,
     /// They sit (or stand, once the chairs are taken) and gesture a little.
     Sitting,

@@ -18,7 +18,7 @@ const KEYS: &[(&str, &str)] = &[
     ("activity", "sitting, walking or crowd"),
     ("robots", "0 to 6, with the people at most 6"),
     ("chair", "on or off: someone pushes a chair"),
-    ("carry", "on or off: someone carries a box"),
+    ("carry", "on or off: someone carries something, puts it down and fetches it"),
     ("object", "box or laptop: what is carried"),
     ("moved", "on or off: a box is displaced while out of view"),
     ("frames", "number of frames"),
