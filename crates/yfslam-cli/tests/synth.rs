@@ -71,6 +71,37 @@ fn boxes_masks_settings_and_lists_are_those_of_the_world() {
 }
 
 #[test]
+fn a_carried_laptop_has_its_name_its_box_and_its_mask() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = "carried_box?object=laptop&people=1&share=0.15&motion=static&fps=1&frames=30&width=320&height=240";
+    succeeds(folder.path(), &["synth", world, "--out", "rec", "-q"]);
+    let rec = folder.path().join("rec");
+    let boxes: Value = serde_json::from_str(&fs::read_to_string(rec.join("boxes.json")).unwrap()).unwrap();
+    let mut seen = 0;
+    for frame in boxes["frames"].as_array().unwrap() {
+        let Some(found) = frame["boxes"].as_array().unwrap().iter().find(|b| b["class"] == "laptop") else { continue };
+        assert_eq!(found["instance"], 2);
+        let stamp = yfslam_io::time::format_stamp(frame["timestamp_ns"].as_i64().unwrap());
+        let mut mask = yfslam::image::RgbImage::default();
+        let bytes = fs::read(rec.join(format!("masks/{stamp}.png"))).unwrap();
+        yfslam_io::decode::decode_color(&bytes, None, &mut mask).unwrap();
+        let own: Vec<usize> = (0..mask.data().len()).filter(|&i| mask.data()[i][0] == 2).collect();
+        let (columns, rows) = (own.iter().map(|i| i % 320), own.iter().map(|i| i / 320));
+        let bounds = [
+            columns.clone().min().unwrap(),
+            rows.clone().min().unwrap(),
+            columns.max().unwrap() + 1,
+            rows.max().unwrap() + 1,
+        ];
+        for (edge, bound) in bounds.into_iter().enumerate() {
+            assert_eq!(found["bbox"][edge], bound as f64, "{stamp}");
+        }
+        seen += 1;
+    }
+    assert!(seen >= 5, "the laptop is seen in {seen} of 30 frames");
+}
+
+#[test]
 fn a_folder_in_use_is_left_alone_unless_it_is_a_recording_and_may_be_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();

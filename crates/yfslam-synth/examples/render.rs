@@ -1,60 +1,57 @@
-//! Renders a few frames of a synthetic world into PNG files, and tells how long a frame takes.
+//! Renders frames of a synthetic world into PNG files, in colour and in depth, and tells how long it took.
 //!
-//! `cargo run --release -p yfslam-synth --example render -- 'synth:walking_xyz?seed=7' out 0 30 60`; the folder `-` writes
-//! nothing.
+//! `cargo run --release -p yfslam-synth --example render -- 'synth:walking_xyz?seed=7' out 0 30 60` writes `out/color_0000.png`,
+//! `out/depth_0000.png` and so on. Without frame numbers it only measures.
 
 use std::error::Error;
-use std::fs::File;
 use std::path::Path;
 use std::time::Instant;
 
-fn save(path: &Path, width: usize, height: usize, rgb: &[u8]) -> Result<(), Box<dyn Error>> {
-    let mut encoder = png::Encoder::new(std::io::BufWriter::new(File::create(path)?), width as u32, height as u32);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.write_header()?.write_image_data(rgb)?;
+use yfslam::image::Image;
+use yfslam_io::write::write_color_png;
+use yfslam_synth::{SynthFrame, World, parse};
+
+/// Frames rendered for the mean rate, spread over the sequence.
+const MEASURED: usize = 20;
+/// Depth that is shown white, m.
+const WHITE_M: f32 = 5.0;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (spec, folder, indices) = match arguments.as_slice() {
+        [spec] => (spec, "", &[][..]),
+        [spec, folder, indices @ ..] => (spec, folder.as_str(), indices),
+        [] => return Err("usage: render SPEC [FOLDER FRAME...]".into()),
+    };
+    let started = Instant::now();
+    let world = World::new(&parse(spec)?)?;
+    let built = started.elapsed();
+    drop(world.frame(0));
+    eprintln!("world after {:.2} s, first frame after {:.2} s", built.as_secs_f64(), started.elapsed().as_secs_f64());
+    eprintln!("actors cover {:.3} of the view", world.person_share());
+    for index in indices {
+        let index: usize = index.parse()?;
+        let shot = world.frame(index);
+        write_color_png(&Path::new(folder).join(format!("color_{index:04}.png")), &shot.frame.color)?;
+        write_color_png(&Path::new(folder).join(format!("depth_{index:04}.png")), &depth_picture(&shot)?)?;
+        eprintln!("frame {index}: boxes {:?}", shot.boxes);
+    }
+    // Once unmeasured: textures are painted when they are first seen.
+    let spread = || (0..MEASURED).map(|k| k * world.len() / MEASURED);
+    spread().for_each(|index| drop(world.frame(index)));
+    let started = Instant::now();
+    spread().for_each(|index| drop(world.frame(index)));
+    let rate = MEASURED as f64 / started.elapsed().as_secs_f64();
+    eprintln!("{rate:.1} frames/s on {} threads", rayon::current_num_threads());
     Ok(())
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let spec = arguments.next().unwrap_or_else(|| "synth:walking_xyz".to_owned());
-    let folder = arguments.next().unwrap_or_else(|| "synth_out".to_owned());
-    let indices = arguments.map(|a| a.parse()).collect::<Result<Vec<usize>, _>>()?;
-    let indices = if indices.is_empty() { vec![0, 60, 120] } else { indices };
-    if folder != "-" {
-        std::fs::create_dir_all(&folder)?;
-    }
-    let started = Instant::now();
-    let world = yfslam_synth::World::new(&yfslam_synth::parse(&spec)?)?;
-    eprintln!("built in {:?}; people cover {:.3} of the view", started.elapsed(), world.person_share());
-    let mut best = f64::INFINITY;
-    for &index in &indices {
-        let started = Instant::now();
-        let shot = world.frame(index);
-        best = best.min(started.elapsed().as_secs_f64());
-        if folder == "-" {
-            continue;
-        }
-        let (width, height) = (shot.instances.width(), shot.instances.height());
-        let color: Vec<u8> = shot.frame.color.data().iter().flatten().copied().collect();
-        // Depth as grey (5 m is white), people tinted.
-        let depth: Vec<u8> = shot
-            .frame
-            .depth
-            .raw
-            .data()
-            .iter()
-            .zip(shot.instances.data())
-            .flat_map(|(&raw, &instance)| {
-                let grey = (f32::from(raw) / 5000.0 * 51.0).min(255.0) as u8;
-                [grey, if instance > 0 { grey / 2 } else { grey }, grey]
-            })
-            .collect();
-        save(&Path::new(&folder).join(format!("color_{index:04}.png")), width, height, &color)?;
-        save(&Path::new(&folder).join(format!("depth_{index:04}.png")), width, height, &depth)?;
-        eprintln!("frame {index}: boxes {:?}", shot.boxes);
-    }
-    eprintln!("fastest frame: {:.1} ms on {} threads", best * 1e3, rayon::current_num_threads());
-    Ok(())
+/// Measured depth as grey, actors tinted.
+fn depth_picture(shot: &SynthFrame) -> Result<Image<[u8; 3]>, Box<dyn Error>> {
+    let depth = &shot.frame.depth;
+    let pixels = depth.raw.data().iter().zip(shot.instances.data()).map(|(&raw, &instance)| {
+        let grey = (f32::from(raw) * depth.metres_per_unit / WHITE_M * 255.0).min(255.0) as u8;
+        [grey, if instance > 0 { grey / 2 } else { grey }, grey]
+    });
+    Ok(Image::from_vec(depth.raw.width(), depth.raw.height(), pixels.collect()).ok_or("no pixels")?)
 }

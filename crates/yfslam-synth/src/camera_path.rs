@@ -29,7 +29,7 @@ const SHAKE_RAD: f64 = 0.0008;
 /// A wheeled robot: slow, low, and rattled a little by its wheels.
 const DRIVE: Pace = Pace { speed: [0.7, 0.7], turn: 0.6, height: 0.85, tilt: 0.05, rounding: 0.6 };
 /// A person who carries the camera around.
-const WALK: Pace = Pace { speed: [0.4, 1.2], turn: 0.698, height: 1.35, tilt: 0.10, rounding: 0.9 };
+pub const WALK: Pace = Pace { speed: [0.4, 1.2], turn: 0.698, height: 1.35, tilt: 0.10, rounding: 0.9 };
 /// How far a loop is walked past its start, relative.
 const LOOP_OVERLAP: f64 = 0.06;
 /// Frequencies (Hz) of hand shake and their weights: slow sway, wrist, and a trace of tremor.
@@ -83,6 +83,11 @@ impl CameraPath {
             path.period += path.duration(k);
         }
         path
+    }
+
+    /// The round, if the camera goes on one.
+    pub fn tour(&self) -> Option<&Tour> {
+        self.tour.as_ref()
     }
 
     /// World from camera at `time` seconds.

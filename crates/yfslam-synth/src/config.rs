@@ -39,7 +39,8 @@ impl CameraMotion {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Activity {
-    /// They walk around the desk, all the same way and two abreast, stop, turn and walk on.
+    /// They walk around the desk, all the same way and two abreast, stop, turn and walk on. Where a camera on a tour leaves no room
+    /// for that (the corridor), they walk the tour: every second one ahead of the camera, the others towards it and past it.
     Walking,
     /// They sit (or stand, once the chairs are taken) and gesture a little.
     Sitting,
@@ -71,6 +72,22 @@ impl SceneKind {
     /// All scenes with their names in specs.
     pub const ALL: [(&str, Self); 4] =
         [("office", Self::Office), ("rescue", Self::Rescue), ("corridor", Self::Corridor), ("lab", Self::Lab)];
+}
+
+/// What someone carries, puts down and fetches again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CarriedObject {
+    /// A cardboard box of 36 cm × 26 cm × 24 cm.
+    #[default]
+    Box,
+    /// An open laptop, 34 cm wide, switched off: its screen is too dark for the depth sensor from some distance on.
+    Laptop,
+}
+
+impl CarriedObject {
+    /// All objects with their names in specs.
+    pub const ALL: [(&str, Self); 2] = [("box", Self::Box), ("laptop", Self::Laptop)];
 }
 
 /// A synthetic sequence.
@@ -141,8 +158,10 @@ pub struct ActorsConfig {
     pub robots: usize,
     /// Whether a walking person pushes a chair around: the first one who carries nothing.
     pub pushed_chair: bool,
-    /// Whether the first walking person carries a box, puts it down, leaves it there and fetches it again.
+    /// Whether the first walking person carries something, puts it down, leaves it there and fetches it again.
     pub carried_box: bool,
+    /// What that is; a box unless `carried_box` is on.
+    pub carried_object: CarriedObject,
     /// Whether a box is displaced while it and its new place are out of the camera's view. If that never happens within
     /// the sequence, it stays where it is.
     pub moved_object: bool,
@@ -197,7 +216,8 @@ pub struct SensorConfig {
     /// Depth noise that grows with distance, 1/m: the second term there (b = 0.0019 /m).
     pub depth_noise_growth: f32,
     /// Depth noise at steep angles θ of the surface, m^1.5: the factor of θ² / (π/2 − θ)² / √z, which is added above 60° (same paper,
-    /// eq. 3: 0.0001).
+    /// eq. 3: 0.0001). The paper itself was not at hand for this term: formula and factor agree with open implementations that cite
+    /// it, and that the two terms above hold alone between 10° and 60° with what others say of it.
     pub depth_noise_angle: f32,
     /// Step of the disparity in px of a structured-light sensor (1/8 for the Kinect: Khoshelham and Elberink,
     /// Sensors 2012, section 3); the depth step is z² · step / bf.
@@ -205,7 +225,7 @@ pub struct SensorConfig {
     /// Whether places that the projector cannot see, and depth edges, have no depth.
     pub holes: bool,
     /// Angle between the surface's normal and the ray beyond which there is no depth, degrees; 90 measures at any angle. The
-    /// default is a choice of ours: little of the projected light comes back from steeper surfaces.
+    /// default is a choice of ours, from no measurement: little of the projected light comes back from steeper surfaces.
     pub max_angle_deg: f32,
     /// Least light that comes back, as reflectance · cos θ / z², 1/m²; darker places have no depth; 0 measures them all. The default
     /// loses black cloth and screens (reflectance 0.04) beyond 2.8 m and keeps grey walls over the whole range.
@@ -308,6 +328,8 @@ impl WorldConfig {
             self.people,
             "at least as many as push a chair or carry a box, and they must walk (activity `walking`)",
         )?;
+        let nobody_carries = !actors.carried_box && actors.carried_object != CarriedObject::Box;
+        check(!nobody_carries, "actors.carried_object", "not a box", "left out unless `carried_box` is on")?;
         check((0.0..=0.8).contains(&self.person_share), "person_share", self.person_share, "between 0 and 0.8")?;
         check((1..=1_000_000).contains(&self.frames), "frames", self.frames, "between 1 and 1000000")?;
         check(size.contains(&camera.width), "camera.width", camera.width, "between 16 and 4096 px")?;

@@ -4,7 +4,9 @@
 
 use yfslam::Camera;
 
-use crate::config::{Activity, CameraMotion, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera};
+use crate::config::{
+    Activity, CameraMotion, CarriedObject, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera,
+};
 use crate::suite::{DEFAULT_NAME, find, names};
 
 /// Keys of a spec and what they set.
@@ -16,7 +18,8 @@ const KEYS: &[(&str, &str)] = &[
     ("activity", "sitting, walking or crowd"),
     ("robots", "0 to 6, with the people at most 6"),
     ("chair", "on or off: someone pushes a chair"),
-    ("carry", "on or off: someone carries a box"),
+    ("carry", "on or off: someone carries something, puts it down and fetches it"),
+    ("object", "box or laptop: what is carried"),
     ("moved", "on or off: a box is displaced while out of view"),
     ("frames", "number of frames"),
     ("share", "share of the view that people cover, 0 to 0.8"),
@@ -86,6 +89,7 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
         "robots" => config.actors.robots = number(key, value)?,
         "chair" => config.actors.pushed_chair = switch(key, value)?,
         "carry" => config.actors.carried_box = switch(key, value)?,
+        "object" => config.actors.carried_object = one_of(key, value, &CarriedObject::ALL)?,
         "moved" => config.actors.moved_object = switch(key, value)?,
         "frames" => config.frames = number(key, value)?,
         "share" => config.person_share = number(key, value)?,
@@ -202,8 +206,13 @@ mod tests {
     #[test]
     fn a_spec_says_what_moves() {
         let config = parse("walking_xyz?people=3&robots=2&chair=on&carry=on&moved=on&share=0.8").unwrap();
-        let actors = ActorsConfig { robots: 2, pushed_chair: true, carried_box: true, moved_object: true };
+        let carried_object = CarriedObject::Box;
+        let actors =
+            ActorsConfig { robots: 2, pushed_chair: true, carried_box: true, carried_object, moved_object: true };
         assert_eq!((config.actors, config.person_share), (actors, 0.8));
+        assert_eq!(parse("carried_box?object=laptop").unwrap().actors.carried_object, CarriedObject::Laptop);
+        assert!(message("walking_xyz?object=laptop").contains("unless `carried_box` is on"));
+        assert!(message("carried_box?object=sofa").contains("use one of box, laptop"));
         assert_eq!(parse("walking_xyz?activity=crowd").unwrap().activity, Activity::Crowd);
         assert!(message("walking_xyz?people=5&robots=2").contains("at most 6 together with the people"));
         assert!(message("walking_xyz?people=1&chair=on&carry=on").contains("at least as many"));

@@ -74,6 +74,8 @@ pub const SUITE: &[NamedWorld] = &[
         |c| {
             passing(c, CameraMotion::Loop);
             c.scene = SceneKind::Corridor;
+            // All the way round: one walks ahead of the camera, one comes towards it.
+            c.person_share = 0.1;
             c.frames = 1250;
         },
     ),

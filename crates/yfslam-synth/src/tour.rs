@@ -84,6 +84,38 @@ impl Tour {
 
     /// World from camera at `time` seconds.
     pub fn pose(&self, time: f64) -> Isometry3<f64> {
+        let [x, y, c, s] = self.at(time);
+        let eye = Point3::new(x, y, self.pace.height);
+        let ahead = Vector3::new(c, s, 0.0).normalize();
+        look_at(eye, eye + ahead - Vector3::z() * self.pace.tilt)
+    }
+
+    /// Place on the floor at `time` seconds, m.
+    pub fn place(&self, time: f64) -> [f64; 2] {
+        let [x, y, ..] = self.at(time);
+        [x, y]
+    }
+
+    /// Time of one round, s.
+    pub fn period(&self) -> f64 {
+        self.tick * self.ticks.len() as f64
+    }
+
+    /// Length of one round, m.
+    pub fn length(&self) -> f64 {
+        let points = self.ticks.iter().zip(self.ticks.iter().cycle().skip(1));
+        points.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum()
+    }
+
+    /// Time at which the round is nearest to `place`, s.
+    pub fn time_near(&self, place: [f64; 2]) -> f64 {
+        let away = |at: &[f64; 4]| distance([at[0], at[1]], place);
+        let nearest = self.ticks.iter().enumerate().min_by(|(_, a), (_, b)| away(a).total_cmp(&away(b)));
+        nearest.map_or(0.0, |(k, _)| k as f64 * self.tick)
+    }
+
+    /// Place and direction of view at `time` seconds.
+    fn at(&self, time: f64) -> [f64; 4] {
         let ticks = (time / self.tick).rem_euclid(self.ticks.len() as f64);
         let (k, t) = (ticks as usize, ticks.fract());
         let weights = [
@@ -93,12 +125,9 @@ impl Tour {
             t.powi(3) / 6.0,
         ];
         let n = self.ticks.len();
-        let [x, y, c, s] = std::array::from_fn(|axis| {
+        std::array::from_fn(|axis| {
             weights.iter().enumerate().map(|(i, w)| w * self.ticks[(k + n + i - 1) % n][axis]).sum::<f64>()
-        });
-        let eye = Point3::new(x, y, self.pace.height);
-        let ahead = Vector3::new(c, s, 0.0).normalize();
-        look_at(eye, eye + ahead - Vector3::z() * self.pace.tilt)
+        })
     }
 }
 
@@ -155,16 +184,12 @@ mod tests {
     const PACE: Pace = Pace { speed: [0.3, 1.2], turn: 0.7, height: 1.4, tilt: 0.05, rounding: 1.0 };
     const CORNERS: [[f64; 2]; 5] = [[0.0, 0.0], [0.0, 6.0], [10.0, 6.0], [10.0, -4.0], [0.0, -4.0]];
 
-    fn period(tour: &Tour) -> f64 {
-        tour.tick * tour.ticks.len() as f64
-    }
-
     #[test]
     fn a_round_takes_the_time_given_unless_that_would_be_too_fast() {
-        assert!((period(&Tour::new(&CORNERS, PACE, 60.0)) - 60.0).abs() < 0.1);
-        let rushed = period(&Tour::new(&CORNERS, PACE, 10.0));
+        assert!((Tour::new(&CORNERS, PACE, 60.0).period() - 60.0).abs() < 0.1);
+        let rushed = Tour::new(&CORNERS, PACE, 10.0).period();
         assert!((31.0..38.0).contains(&rushed), "40 m with rounded corners in {rushed} s");
-        let patient = period(&Tour::new(&CORNERS, PACE, 1000.0));
+        let patient = Tour::new(&CORNERS, PACE, 1000.0).period();
         assert!((110.0..135.0).contains(&patient), "{patient} s");
     }
 
@@ -172,7 +197,7 @@ mod tests {
     fn speed_and_turning_stay_within_the_pace() {
         let tour = Tour::new(&CORNERS, PACE, 10.0);
         let h = 0.01;
-        let poses: Vec<_> = (0..(period(&tour) / h) as usize).map(|i| tour.pose(i as f64 * h)).collect();
+        let poses: Vec<_> = (0..(tour.period() / h) as usize).map(|i| tour.pose(i as f64 * h)).collect();
         for pair in poses.windows(2) {
             let speed = (pair[1].translation.vector - pair[0].translation.vector).norm() / h;
             let turn = pair[0].rotation.angle_to(&pair[1].rotation) / h;

@@ -378,26 +378,29 @@ fn is_corner(grey: &dyn Fn(usize, usize) -> i32, x: usize, y: usize) -> bool {
 
 #[test]
 fn corners_abound_all_over_the_picture_at_several_scales() {
-    let mut config = config("walking_xyz?seed=16&people=0");
-    config.light.shadow_rays = 2;
-    config.sensor.color_noise = 1.5;
-    let world = World::new(&config).unwrap();
-    let image = world.frame(30).frame.color;
-    for shrink in [1, 2, 3] {
-        // Box-filtered to 1/shrink of the size.
-        let grey = |x: usize, y: usize| -> i32 {
-            let block =
-                (0..shrink * shrink).filter_map(|i| image.get(x * shrink + i % shrink, y * shrink + i / shrink));
-            block.map(|p| i32::from(p[1])).sum::<i32>() / (shrink * shrink) as i32
-        };
-        let (width, height) = (320 / shrink, 240 / shrink);
-        let mut cells = [false; 48];
-        for (x, y) in (3..height - 3).flat_map(|y| (3..width - 3).map(move |x| (x, y))) {
-            cells[(y * 6 / height) * 8 + x * 8 / width] |= is_corner(&grey, x, y);
+    for seed in [1, 2, 3, 16] {
+        let mut config = config(&format!("walking_xyz?seed={seed}&people=0"));
+        config.light.shadow_rays = 2;
+        config.sensor.color_noise = 1.5;
+        let image = World::new(&config).unwrap().frame(30).frame.color;
+        for shrink in [1, 2, 3] {
+            // Box-filtered to 1/shrink of the size.
+            let grey = |x: usize, y: usize| -> i32 {
+                let block =
+                    (0..shrink * shrink).filter_map(|i| image.get(x * shrink + i % shrink, y * shrink + i / shrink));
+                block.map(|p| i32::from(p[1])).sum::<i32>() / (shrink * shrink) as i32
+            };
+            let (width, height) = (320 / shrink, 240 / shrink);
+            let mut rows = [[false; 8]; 6];
+            for (x, y) in (3..height - 3).flat_map(|y| (3..width - 3).map(move |x| (x, y))) {
+                rows[y * 6 / height][x * 8 / width] |= is_corner(&grey, x, y);
+            }
+            let filled = |rows: &[[bool; 8]]| rows.as_flattened().iter().filter(|&&filled| filled).count();
+            // The first row sees the ceiling, whose fine holes blur away at smaller sizes; the last one carpet and shadows.
+            let (all, below) = (filled(&rows), filled(&rows[1..]));
+            assert!(below >= 35, "seed {seed}: at 1/{shrink} of the size {below} of 40 cells have a corner: {rows:?}");
+            assert!(shrink > 1 || all >= 40, "seed {seed}: at full size {all} of 48 cells have a corner: {rows:?}");
         }
-        let filled = cells.iter().filter(|&&filled| filled).count();
-        // The partition behind the desks is plain, as in the room of the freiburg3 sequences.
-        assert!(filled >= 32, "at 1/{shrink} of the size only {filled} of 48 cells have a corner");
     }
 }
 

@@ -1,12 +1,13 @@
 //! All that moves: people, robots, and things that are pushed, carried or displaced.
 //!
 //! In: a scene, a configuration and a seed. Out: at any time, everyone's posed meshes and the spheres that shade their
-//! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried box, displaced box. What
+//! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried object, displaced box. What
 //! nobody can move (desks, the chairs of the scene) is no actor.
 
+pub mod companion;
 pub mod displaced;
 pub mod people;
-mod rounds;
+pub mod rounds;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may")]
 mod tests;
@@ -16,7 +17,7 @@ pub mod walkway;
 use yfslam::Camera;
 
 use crate::camera_path::CameraPath;
-use crate::config::{Activity, WorldConfig};
+use crate::config::{Activity, CarriedObject, WorldConfig};
 use crate::light::{Lights, Occluder};
 use crate::mesh::{Mesh, Vec3};
 use crate::scene::Scene;
@@ -25,12 +26,11 @@ use people::body::Body;
 use people::skeleton::BonePoses;
 use people::tasks::{self, Task};
 use people::{Person, Plan, upright};
-use rounds::round;
+use rounds::{Way, way};
 use thing::Thing;
-use walkway::Walkway;
 
 /// Names of the classes of actors, by the class of a [`SynthFrame`](crate::SynthFrame)'s boxes and detections.
-pub const CLASS_NAMES: [&str; 4] = ["person", "robot", "chair", "box"];
+pub const CLASS_NAMES: [&str; 5] = ["person", "robot", "chair", "box", "laptop"];
 
 /// What an actor is; the value is the index into [`CLASS_NAMES`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,12 +39,13 @@ pub enum Class {
     Robot,
     Chair,
     Box,
+    Laptop,
 }
 
 /// Where a thing is.
 #[derive(Clone, Debug)]
 enum Motion {
-    Drives(Walkway),
+    Drives(Way),
     /// Pushed or carried by the person of this index.
     Handled(usize),
     Displaced(Displaced),
@@ -62,21 +63,23 @@ impl Actors {
     pub fn new(scene: &mut Scene, config: &WorldConfig, path: &CameraPath) -> Self {
         let bodies: Vec<Body> =
             (0..config.people).map(|k| Body::new(k as u8 + 1, &mut scene.palette, config.seed)).collect();
-        let person = |(k, body)| Person::new(body, plan(scene, config, k), config.seed, k);
+        let person = |(k, body)| Person::new(body, plan(scene, config, path, k), config.seed, k);
         let people: Vec<Person> = bodies.into_iter().enumerate().map(person).collect();
         let mut actors = Self { people, things: Vec::new() };
         let wanted = &config.actors;
         for robot in 0..wanted.robots {
-            let way = round(scene, config, config.people + robot, 0.5);
+            let way = way(scene, config, path, config.people + robot, 0.5);
             actors.add(Motion::Drives(way), |instance| Thing::robot(instance, &mut scene.palette, config.seed));
         }
         if let Some(pusher) = rounds::pusher(config) {
             actors.add(Motion::Handled(pusher), |instance| Thing::chair(instance, &mut scene.palette, config.seed));
         }
         if let Some(carrier) = rounds::carrier(config) {
-            let size = Vec3::from(tasks::BOX_M);
-            actors.add(Motion::Handled(carrier), |instance| {
-                Thing::cardboard(instance, &mut scene.palette, size, config.seed)
+            actors.add(Motion::Handled(carrier), |instance| match wanted.carried_object {
+                CarriedObject::Box => Thing::cardboard(instance, &mut scene.palette, tasks::BOX_M.into(), config.seed),
+                CarriedObject::Laptop => {
+                    Thing::laptop(instance, &mut scene.palette, tasks::LAPTOP_M.into(), config.seed)
+                }
             });
         }
         if wanted.moved_object {
@@ -109,7 +112,7 @@ impl Actors {
 
     /// Leads all who go round nearer to the camera (up to 2) or farther from it (0); the further below 0, the later they
     /// come by.
-    pub fn set_closeness(&mut self, scene: &Scene, config: &WorldConfig, closeness: f64) {
+    pub fn set_closeness(&mut self, scene: &Scene, config: &WorldConfig, path: &CameraPath, closeness: f64) {
         let walkers = self.people.iter_mut().enumerate().filter_map(|(k, person)| match &mut person.plan {
             Plan::Walk(way, _) => Some((k, way)),
             _ => None,
@@ -118,8 +121,8 @@ impl Actors {
             Motion::Drives(way) => Some(way),
             _ => None,
         });
-        for (k, way) in walkers.chain(drivers.enumerate().map(|(k, way)| (config.people + k, way))) {
-            *way = round(scene, config, k, closeness);
+        for (k, old) in walkers.chain(drivers.enumerate().map(|(k, way)| (config.people + k, way))) {
+            *old = way(scene, config, path, k, closeness);
         }
     }
 
@@ -144,7 +147,7 @@ impl Actors {
                     upright(step.position.map(|v| v as f32), 0.0, (step.heading + step.glance) as f32)
                 }
                 Motion::Handled(by) => match &self.people[*by].plan {
-                    Plan::Walk(way, Task::Carry) => tasks::carried_box(way, &way.at(time), &poses[*by]),
+                    Plan::Walk(way, Task::Carry(object)) => tasks::carried(*object, way, &way.at(time), &poses[*by]),
                     Plan::Walk(way, _) => tasks::chair(&way.at(time)),
                     _ => continue,
                 },
@@ -158,14 +161,14 @@ impl Actors {
 }
 
 /// What person `k` does.
-fn plan(scene: &Scene, config: &WorldConfig, k: usize) -> Plan {
+fn plan(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize) -> Plan {
     let walk = || {
         let task = match k {
             _ if rounds::pusher(config) == Some(k) => Task::Push,
-            _ if rounds::carrier(config) == Some(k) => Task::Carry,
+            _ if rounds::carrier(config) == Some(k) => Task::Carry(config.actors.carried_object),
             _ => Task::Nothing,
         };
-        Plan::Walk(round(scene, config, k, 0.5), task)
+        Plan::Walk(way(scene, config, path, k, 0.5), task)
     };
     let seats = scene.seats.len();
     match config.activity {

@@ -1,14 +1,20 @@
 //! The rounds that people walk and robots drive, timed so that nobody runs into anybody.
 //!
-//! In: a scene, how many go round, and how close to the camera. Out: a way for each. There are two lanes, an oval in an
-//! oval around the furniture. All go the same way, two abreast: to a camera, several people who stroll past together are
-//! harder than people who stand, or cross each other, because most of what it sees then moves alike.
+//! In: a scene, the camera's path, how many go round, and how close to the camera. Out: a way for each. There are two lanes,
+//! an oval in an oval around the furniture. All go the same way, two abreast: to a camera, several people who stroll past
+//! together are harder than people who stand, or cross each other, because most of what it sees then moves alike.
+//!
+//! Where a camera that goes on a tour would run into them, as in a corridor, people walk that tour themselves: every second one
+//! ahead of the camera, the others towards it and past it.
 
+use super::companion::{Companion, Manner};
 use super::people::tasks::HANDLING_S;
-use super::walkway::{Stop, Walkway};
+use super::walkway::{Step, Stop, Walkway};
+use crate::camera_path::{CameraPath, WALK};
 use crate::config::{Activity, WorldConfig};
 use crate::rng::Rng;
 use crate::scene::Scene;
+use crate::tour::Tour;
 
 const LANE_M: f64 = 0.5;
 /// How far the outer of two abreast is ahead of the inner one before the camera, which so sees both, m.
@@ -20,6 +26,37 @@ const PAST_SHARE: f64 = 0.6;
 const STROLL: f64 = 0.25;
 /// Pause before the camera at closeness 2, for one, two or three of a lane, who must not catch up with each other, s.
 const LINGER_S: [f64; 3] = [14.0, 14.0, 9.5];
+
+/// How far ahead of the camera its first companion walks at closeness 0 and at closeness 2, on average, m.
+const LEAD_M: [f64; 2] = [5.0, 2.0];
+/// How much farther ahead each further one walks, m.
+const APART_M: f64 = 1.2;
+/// How much they fall back and hurry ahead, as a share of their lead, and how fast, rad/s.
+const WAVER: f64 = 0.12;
+const WAVER_RATE: f64 = 0.45;
+/// How far to the left of the camera's tour those ahead of it walk, so that they keep clear of those who come towards them, m.
+const LEFT_M: f64 = 0.12;
+/// Pace of those who come towards the camera, relative to the camera's.
+const TOWARDS: f64 = 0.8;
+
+/// The way of someone who goes round.
+#[derive(Clone, Debug)]
+pub enum Way {
+    /// Around the furniture.
+    Around(Walkway),
+    /// Along the camera's tour.
+    Along(Companion),
+}
+
+impl Way {
+    /// Where the walker is at `time` seconds.
+    pub fn at(&self, time: f64) -> Step {
+        match self {
+            Self::Around(way) => way.at(time),
+            Self::Along(way) => way.at(time),
+        }
+    }
+}
 
 /// Index of the person who carries a box: the first one, whose inner lane has room at its side.
 pub fn carrier(config: &WorldConfig) -> Option<usize> {
@@ -39,9 +76,41 @@ fn lane_of(k: usize) -> usize {
     (k + 1) % 2
 }
 
+/// The way of number `k` of those who go round, for a closeness up to 2.
+pub fn way(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize, closeness: f64) -> Way {
+    match (path.tour(), scene.passing_lane_m) {
+        (Some(tour), Some(lane_m)) => Way::Along(along(scene, config, tour, lane_m, k, closeness)),
+        _ => Way::Around(round(scene, config, k, closeness)),
+    }
+}
+
+/// Number `k` on the camera's tour: the even ones ahead of it, the less far the closer, the odd ones towards it in the lane beside
+/// the tour.
+fn along(scene: &Scene, config: &WorldConfig, tour: &Tour, lane_m: f64, k: usize, closeness: f64) -> Companion {
+    let mut draw = Rng::new(config.seed, 0xc0a1);
+    let seconds = config.frames as f64 / config.camera.fps;
+    if k.is_multiple_of(2) {
+        let [far, near] = LEAD_M.map(f64::ln);
+        let lead_m = (far + (near - far) * closeness / 2.0).exp();
+        let pace = tour.length() / tour.period();
+        // All waver alike, and so never run into each other.
+        let waver = [WAVER * lead_m / pace, WAVER_RATE, draw.range64(0.0, std::f64::consts::TAU)];
+        let start_s = (lead_m + APART_M * (k / 2) as f64) / pace;
+        return Companion::new(tour.clone(), Manner { start_s, rate: 1.0, beside_m: -LEFT_M, waver });
+    }
+    // Beside a tour with narrow bends nobody could walk: this lane has wide ones.
+    let lane = Tour::new(&scene.round, WALK, tour.period());
+    let early = Rng::new(config.seed, 0x1a7e).range64(0.3, 0.6) * seconds.min(12.0);
+    let of_these = ((walkers(scene, config) + config.actors.robots) / 2).max(1);
+    let behind_s = (k / 2) as f64 / of_these as f64 * lane.period();
+    let start_s = lane.time_near(tour.place(early)) + TOWARDS * early + behind_s;
+    let manner = Manner { start_s, rate: -TOWARDS, beside_m: lane_m, waver: [0.0; 3] };
+    Companion::new(lane, manner)
+}
+
 /// The round of number `k` of those who go round, for a closeness up to 2: strolls the slower past the camera, and waits the
 /// shorter out of its sight, the closer; beyond 1 they come nearer, too, stop before it and face it.
-pub fn round(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> Walkway {
+fn round(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> Walkway {
     let going = walkers(scene, config) + config.actors.robots;
     let in_lane = (0..going).filter(|&other| lane_of(other) == lane_of(k)).count().max(1);
     let [own, model] = [k, 1].map(|number| lane(scene, config, number, closeness));

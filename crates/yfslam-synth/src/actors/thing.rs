@@ -1,4 +1,4 @@
-//! Rigid actors: a tracked rescue robot, an office chair, cardboard boxes.
+//! Rigid actors: a tracked rescue robot, an office chair, cardboard boxes, an open laptop.
 //!
 //! In: what it is and a seed. Out: a mesh in its own axes (right, forward, up; the origin on the floor below its middle), and
 //! that mesh at a pose.
@@ -18,6 +18,11 @@ use crate::texture::material::{Material, Pattern};
 const RUBBER: [f32; 3] = [0.13, 0.13, 0.14];
 const STEEL: [f32; 3] = [0.50, 0.52, 0.55];
 const DARK: [f32; 3] = [0.19, 0.19, 0.21];
+/// A screen that is switched off.
+const GLASS: [f32; 3] = [0.04, 0.04, 0.05];
+/// Height of a laptop's lid and how far it leans back beyond upright, m and rad.
+const LID_M: f32 = 0.225;
+const LID_LEANS: f32 = 0.35;
 
 /// A rigid actor.
 #[derive(Clone, Debug)]
@@ -55,6 +60,27 @@ impl Thing {
             b.density = 600.0;
             // A hair above the floor, so that the bottom is there when the box is lifted.
             b.cuboid(Vec3::z() * 0.011, size - Vec3::z() * 0.011, 0.0, |_| Material::Cardboard);
+        })
+    }
+
+    /// An open laptop whose lower half has the given size; its screen is off and faces back.
+    pub fn laptop(instance: u8, palette: &mut Palette, size: Vec3, seed: u64) -> Self {
+        let spheres = vec![ball(0.0, 0.0, 0.06, 0.12)];
+        Self::build(Class::Laptop, instance, palette, seed, spheres, |b| {
+            let paint = b.rng.pick([STEEL, [0.30, 0.31, 0.34], [0.74, 0.74, 0.76], [0.20, 0.28, 0.42]]);
+            b.density = 900.0;
+            // A hair above the floor, as boxes are.
+            b.cuboid(Vec3::z() * 0.011, size, 0.0, |side| match side {
+                Side::Top => Material::Keyboard,
+                _ => Material::Plain(paint),
+            });
+            let hinge = Vec3::new(0.0, size.y / 2.0, 0.011 + size.z);
+            let lean = UnitQuaternion::from_axis_angle(&Vec3::x_axis(), -LID_LEANS);
+            let lid = Vec3::new(size.x, 0.008, LID_M);
+            b.tilted(Isometry3::from_parts(hinge.into(), lean), lid, |side| match side {
+                Side::Front => Material::Plain(GLASS),
+                _ => Material::Plain(paint),
+            });
         })
     }
 

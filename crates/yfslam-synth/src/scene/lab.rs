@@ -36,6 +36,7 @@ pub fn build(seed: u64) -> Scene {
         walk_far_y: 2.0,
         walk_near_y: [-0.65, -0.30],
         round: vec![[0.0, -1.3], [-1.6, -1.2], [-1.6, 1.5], [1.6, 1.5], [1.6, -1.2]],
+        passing_lane_m: None,
         seats,
         stands: vec![stand(-1.7, 1.2, -2.4), stand(1.8, 1.1, 2.4), stand(-0.4, 2.0, 3.0), stand(0.6, 1.9, -2.8)],
     }

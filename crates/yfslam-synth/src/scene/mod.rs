@@ -45,6 +45,9 @@ pub struct Scene {
     pub walk_near_y: [f64; 2],
     /// Corners of a closed round on the floor along which a camera can be carried or driven, the first on a straight, m.
     pub round: Vec<[f64; 2]>,
+    /// How far to the right of that round someone can walk past the camera on it, m; `None` where the walk around the furniture
+    /// keeps clear of the round.
+    pub passing_lane_m: Option<f64>,
     /// Where people can sit.
     pub seats: Vec<Seat>,
     /// Where people can stand without being in the way: position on the floor and heading.

@@ -86,7 +86,7 @@ fn disturb(z: f32, bf: f32, cosine: f32, sensor: &SensorConfig, normal: f32) -> 
     }
 }
 
-/// Cosine of 60°: flatter surfaces show no effect of the angle (Nguyen et al. 2012, section 2.4).
+/// Cosine of 60°: flatter surfaces show no effect of the angle (Nguyen et al. 2012; see [`SensorConfig::depth_noise_angle`]).
 const STEEP_COSINE: f32 = 0.5;
 
 /// Which pixels of a row the projector reaches. It stands to the right of the camera by the baseline: a point at column

@@ -10,7 +10,7 @@ pub mod tasks;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
-use super::walkway::Walkway;
+use super::rounds::Way;
 use crate::light::Occluder;
 use crate::mesh::Vec3;
 use crate::rng::{Rng, hash};
@@ -23,7 +23,7 @@ use tasks::Task;
 #[derive(Clone, Debug)]
 pub enum Plan {
     /// Walks a round, perhaps with something to do on the way.
-    Walk(Walkway, Task),
+    Walk(Way, Task),
     /// Sits and gestures.
     Sit(Seat),
     /// Sits down and gets up again and again.

@@ -1,14 +1,16 @@
-//! What walkers do with their hands: push a chair, or carry a box from one stop to another and leave it there.
+//! What walkers do with their hands: push a chair, or carry something from one stop to another and leave it there.
 //!
-//! In: where a walker is on the way. Out: the walker's bend, turn and arms, and the pose of the thing. The box visits the two
+//! In: where a walker is on the way. Out: the walker's bend, turn and arms, and the pose of the thing. What is carried visits the two
 //! stops P and Q (in walking order) in a cycle of three rounds: fetched at P, put down at Q, left there, fetched at Q, put
-//! down at P, left there.
+//! down at P, left there. Who walks along the camera's tour does not stop, and holds it all the time.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
 use super::skeleton::{self, BonePoses, Joints, Proportions};
 use super::{gait, smooth, upright};
+use crate::actors::rounds::Way;
 use crate::actors::walkway::{Step, Walkway};
+use crate::config::CarriedObject;
 use crate::mesh::Vec3;
 
 /// Something to do while walking.
@@ -18,13 +20,15 @@ pub enum Task {
     Nothing,
     /// Pushes a chair.
     Push,
-    /// Carries a box between the first two stops.
-    Carry,
+    /// Carries something between the first two stops.
+    Carry(CarriedObject),
 }
 
 /// Size of the carried box: right, forward, up, m.
 pub const BOX_M: [f32; 3] = [0.36, 0.26, 0.24];
-/// Least pause at the stops where the box is fetched or put down, s.
+/// Size of the carried laptop without its lid, and of that: right, forward, up, m.
+pub const LAPTOP_M: [f32; 3] = [0.34, 0.235, 0.018];
+/// Least pause at the stops where it is fetched or put down, s.
 pub const HANDLING_S: f64 = 3.4;
 /// The two stops.
 const STOPS: [usize; 2] = [0, 1];
@@ -32,12 +36,15 @@ const STOPS: [usize; 2] = [0, 1];
 const CHAIR_AHEAD_M: f32 = 0.68;
 /// Hands on the chair's back, in the chair's axes, m.
 const CHAIR_GRIP_M: [f32; 3] = [0.17, -0.25, 0.99];
-/// Where the box is held, relative to the hips: forward, up to its bottom, m.
-const HOLD_M: [f32; 2] = [0.31, 0.13];
-/// Where the box stands on the floor, ahead of the one who put it there, m.
+/// Where box and laptop are held, relative to the hips: forward, up to the bottom, m.
+const HOLD_BOX_M: [f32; 2] = [0.31, 0.13];
+const HOLD_LAPTOP_M: [f32; 2] = [0.31, 0.26];
+/// How much deeper than for the box one stoops for the laptop.
+const LOW: f32 = 1.22;
+/// Where it stands on the floor, ahead of the one who put it there, m.
 const PUT_AHEAD_M: f32 = 0.58;
 
-/// What happens to the box.
+/// What happens to what is carried.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Handling {
     /// In the hands, while walking.
@@ -51,31 +58,37 @@ enum Handling {
 
 impl Task {
     /// Bends the walker as the task asks for; returns the turn relative to the way if the task decides on it.
-    pub fn prepare(self, way: &Walkway, step: &Step, joints: &mut Joints) -> Option<f32> {
+    pub fn prepare(self, way: &Way, step: &Step, joints: &mut Joints) -> Option<f32> {
         match self {
             Self::Nothing => None,
             Self::Push => {
                 joints.trunk[0] += 0.12;
                 Some(0.0)
             }
-            Self::Carry => {
+            Self::Carry(object) => {
+                let Way::Around(way) = way else { return None };
                 let (turned, bent) = match handling(way, step) {
                     Handling::Fetched(_, t) | Handling::PutDown(_, t) => (turned(t), bent(t)),
                     _ => return None,
                 };
-                gait::stoop(joints, bent);
+                // A laptop is low: hands reach down to the floor.
+                gait::stoop(joints, bent * if object == CarriedObject::Laptop { LOW } else { 1.0 });
                 Some(inwards(way) * turned)
             }
         }
     }
 
     /// Puts the hands where the task needs them.
-    pub fn hands(self, way: &Walkway, step: &Step, p: &Proportions, poses: &mut BonePoses) {
+    pub fn hands(self, way: &Way, step: &Step, p: &Proportions, poses: &mut BonePoses) {
         let (thing, grip, firm) = match self {
             Self::Nothing => return,
             Self::Push => (chair(step), CHAIR_GRIP_M, 1.0),
-            Self::Carry => {
-                let firm = match handling(way, step) {
+            Self::Carry(object) => {
+                let handling = match way {
+                    Way::Around(way) => handling(way, step),
+                    Way::Along(_) => Handling::Held,
+                };
+                let firm = match handling {
                     Handling::Held => 1.0,
                     Handling::Left(_) => return,
                     Handling::Fetched(_, t) => {
@@ -93,7 +106,7 @@ impl Task {
                         }
                     }
                 };
-                (carried_box(way, step, poses), [BOX_M[0] / 2.0 + 0.01, 0.0, 0.8 * BOX_M[2]], firm)
+                (carried(object, way, step, poses), grip_m(object), firm)
             }
         };
         for (side, sign) in [(0, 1.0), (1, -1.0)] {
@@ -110,16 +123,27 @@ pub fn chair(step: &Step) -> Isometry3<f32> {
     pusher * Translation3::new(0.0, CHAIR_AHEAD_M, 0.0)
 }
 
-/// Pose of the box: the middle of its bottom, in the hands of the one whose bones are given, or on the floor.
-pub fn carried_box(way: &Walkway, step: &Step, poses: &BonePoses) -> Isometry3<f32> {
-    // The hips' own turn and roll are left out: hands keep a box level.
+/// Where the hands hold what is carried, in its axes, on its right, m.
+pub fn grip_m(object: CarriedObject) -> [f32; 3] {
+    match object {
+        CarriedObject::Box => [BOX_M[0] / 2.0 + 0.01, 0.0, 0.8 * BOX_M[2]],
+        CarriedObject::Laptop => [LAPTOP_M[0] / 2.0, 0.02, LAPTOP_M[2]],
+    }
+}
+
+/// Pose of what is carried: the middle of its bottom, in the hands of the one whose bones are given, or on the floor.
+pub fn carried(object: CarriedObject, way: &Way, step: &Step, poses: &BonePoses) -> Isometry3<f32> {
+    // The hips' own turn and roll are left out: hands keep things level.
     let hips = poses[0].translation.vector;
-    let held = |turned: f32| {
-        upright([hips.x, hips.y], hips.z, step.heading as f32 + inwards(way) * turned)
-            * Translation3::new(0.0, HOLD_M[0], HOLD_M[1])
+    let [ahead, up] = match object {
+        CarriedObject::Box => HOLD_BOX_M,
+        CarriedObject::Laptop => HOLD_LAPTOP_M,
     };
+    let held =
+        |turn: f32| upright([hips.x, hips.y], hips.z, step.heading as f32 + turn) * Translation3::new(0.0, ahead, up);
+    let Way::Around(way) = way else { return held(0.0) };
     let between = |stop: usize, t: f32| {
-        let (from, to, share) = (held(turned(t)), left_at(way, stop), bent(t));
+        let (from, to, share) = (held(inwards(way) * turned(t)), left_at(way, stop), bent(t));
         Isometry3::from_parts(
             Translation3::from(from.translation.vector.lerp(&to.translation.vector, share)),
             from.rotation.nlerp(&to.rotation, share),
@@ -145,7 +169,7 @@ pub fn carried_box(way: &Walkway, step: &Step, poses: &BonePoses) -> Isometry3<f
     }
 }
 
-/// Pose of the box on the floor at a stop: beside the way, on its inner side.
+/// Pose on the floor at a stop: beside the way, on its inner side.
 fn left_at(way: &Walkway, stop: usize) -> Isometry3<f32> {
     let (position, heading) = way.place_of(stop);
     let turn = UnitQuaternion::from_axis_angle(&Vec3::z_axis(), heading as f32 + inwards(way));
@@ -182,7 +206,7 @@ fn handling(way: &Walkway, step: &Step) -> Handling {
     let arrives = (leg == leg_p || leg == leg_q) && step.waited > 0.0;
     let spare = (step.pause - HANDLING_S).max(0.0) / 2.0;
     let t = ((step.waited - spare) / HANDLING_S.min(step.pause)).clamp(0.0, 1.0) as f32;
-    // What the last of the arrivals so far has made of the box.
+    // What the last of the arrivals so far has made of it.
     match ((before + i64::from(arrives) - 1).rem_euclid(6), arrives) {
         (0, true) => Handling::Fetched(p, t),
         (1, true) => Handling::PutDown(q, t),
