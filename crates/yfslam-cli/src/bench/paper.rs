@@ -3,7 +3,7 @@
 //!
 //! In: all cells. Out: tables with headings. What papers published stands beside a recorded sequence of the very name, if all of it was run.
 
-use yfslam_eval::report::{IMPROVEMENT, PUBLISHED, TableSection};
+use yfslam_eval::report::{IMPROVEMENT, ORIGIN, PUBLISHED, TableSection};
 use yfslam_eval::{Measure, Statistics, Table, improvement_percent, published};
 
 use super::Cell;
@@ -79,7 +79,7 @@ impl Errors {
             "RMSE, min–max".to_owned(),
             format!("{IMPROVEMENT} of RMSE (%)"),
             format!("{IMPROVEMENT} of S.D. (%)"),
-            "figures".to_owned(),
+            ORIGIN.to_owned(),
         ]);
         for (place, row) in rows.iter().enumerate() {
             table.push(self.measured(row, rows));

@@ -26,7 +26,7 @@ mod tables_page;
 mod views;
 
 use crate::{Evaluation, StampedPose};
-pub use tables_page::{IMPROVEMENT, PUBLISHED, TableSection, TablesPage};
+pub use tables_page::{IMPROVEMENT, ORIGIN, PUBLISHED, TableSection, TablesPage};
 
 /// What a report is about.
 #[derive(Clone, Debug)]

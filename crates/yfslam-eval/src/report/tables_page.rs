@@ -8,6 +8,8 @@ use crate::Table;
 
 /// Word with which the last cell of a row begins whose figures were taken from a paper.
 pub const PUBLISHED: &str = "published";
+/// Header of the column that says where figures come from.
+pub const ORIGIN: &str = "figures";
 /// Header that begins the name of a column of improvements.
 pub const IMPROVEMENT: &str = "improvement";
 
@@ -106,6 +108,7 @@ fn cell_of(header: Option<&String>, is_ours: bool, repeats: bool, cell: &str) ->
         @if repeats { th {} }
         @else if is_ours { th style=(format!("color:var({})", Ink::method(cell, 0).variable())) { (cell) } }
         @else if header.is_some_and(|header| header == "sequence" || header == "system") { th { (cell) } }
+        @else if header.is_some_and(|header| header == ORIGIN) { td.figures-of { (cell) } }
         @else { td.improve[improves].worse[improves && cell.starts_with('-')] { (cell.replace('-', "−")) } }
     }
 }
