@@ -86,6 +86,11 @@ pub struct SharedDetector {
     /// Indices of the classes that can move.
     movable: Vec<usize>,
     found: Vec<Detection>,
+    /// As `dynamic.detect_every`.
+    every: usize,
+    /// Frames that no method refuses for their time, and the time of the last of them, ns.
+    frames: usize,
+    last_ns: Option<i64>,
     tally: DetectionTally,
 }
 
@@ -117,11 +122,30 @@ impl SharedDetector {
             known.iter().position(|k| k == name).ok_or_else(unknown)
         };
         let movable = config.dynamic.movable.iter().map(index).collect::<Result<_, _>>()?;
-        Ok(Self { detector, times, movable, found: Vec::new(), tally: DetectionTally::default() })
+        let (found, tally) = (Vec::new(), DetectionTally::default());
+        Ok(Self {
+            detector,
+            times,
+            movable,
+            found,
+            every: config.dynamic.detect_every,
+            frames: 0,
+            last_ns: None,
+            tally,
+        })
     }
 
-    /// Puts its boxes into the frame.
+    /// Puts its boxes into the frame, or none where no method asks for any.
     pub fn see(&mut self, frame: &mut RgbdFrame) {
+        frame.detections = Some(Vec::new());
+        if self.last_ns.is_some_and(|last_ns| last_ns >= frame.timestamp_ns) {
+            return;
+        }
+        self.last_ns = Some(frame.timestamp_ns);
+        self.frames += 1;
+        if !(self.frames - 1).is_multiple_of(self.every) {
+            return;
+        }
         if let Err(error) = self.detector.detect(&frame.color, &mut self.found) {
             tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
             self.found.clear();

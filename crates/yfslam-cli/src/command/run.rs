@@ -33,6 +33,7 @@ Examples:
   yfslam run DIR --start 100 --end 400 --reverse --overlay --report
   yfslam run DIR --save-map lab.map                    then, another day:
   yfslam run OTHER --load-map lab.map --localise
+  yfslam run DIR --detect-every 3                      the network looks at every third frame
   yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
 
 In the output folder:
@@ -155,6 +156,10 @@ impl RunArgs {
         if methods.is_empty() {
             methods.push(config.dynamic.method);
         }
+        ensure!(
+            !config.dynamic.detect_async || self.map.threaded,
+            "--detect-async (dynamic.detect_async) is for live use, whose results differ from run to run; add --threaded"
+        );
         let options = self.map.of_one_method();
         ensure!(
             methods.len() == 1 || options.is_empty(),
