@@ -7,7 +7,7 @@ use std::fmt;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use serde::Serialize;
 use yfslam::dynamic::Method;
 use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError};
@@ -15,6 +15,7 @@ use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError};
 use crate::cpu;
 use crate::detector::{self, DetectorArgs, LoadedDetector, ModelIdentity, Took};
 use crate::pipeline::Stages;
+use crate::settings::describe;
 use crate::source::SourceArgs;
 use crate::terminal::Terminal;
 
@@ -28,6 +29,8 @@ pub enum BoxOrigin {
     Renderer,
     /// The `boxes.json` of the folder.
     Folder,
+    /// None: masks tell what can move.
+    Masks,
     /// A network.
     Detector(ModelIdentity),
 }
@@ -45,6 +48,7 @@ impl fmt::Display for BoxOrigin {
             Self::None => f.write_str("none needed"),
             Self::Renderer => f.write_str("exact, from the renderer"),
             Self::Folder => f.write_str("exact, from the recording's boxes.json"),
+            Self::Masks => f.write_str("none; masks tell what can move"),
             Self::Detector(model) => model.fmt(f),
         }
     }
@@ -53,7 +57,7 @@ impl fmt::Display for BoxOrigin {
 /// The origin of the boxes that `methods` need, and the detector if it is one.
 ///
 /// # Errors
-/// The detector cannot be used.
+/// The detector cannot be used, or there are masks alone and a method cannot use them.
 pub fn choose(
     args: &DetectorArgs,
     source: &SourceArgs,
@@ -63,6 +67,16 @@ pub fn choose(
 ) -> Result<(BoxOrigin, Option<LoadedDetector>)> {
     if !methods.iter().any(|method| method.needs_boxes()) {
         return Ok((BoxOrigin::None, None));
+    }
+    if args.detector.is_none() && source.masks.is_some() {
+        if let Some(method) = methods.iter().find(|method| matches!(method, Method::Boxes | Method::Yf)) {
+            let (name, _) = describe(*method);
+            bail!(
+                "method {name} works on boxes alone; add --detector embedded to find them, or leave it out of --method"
+            );
+        }
+        terminal.note("no --detector: the masks alone tell what can move");
+        return Ok((BoxOrigin::Masks, None));
     }
     if args.detector.is_none() && source.is_synthetic() {
         terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
