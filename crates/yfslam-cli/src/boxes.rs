@@ -7,7 +7,7 @@ use std::fmt;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use serde::Serialize;
 use yfslam::dynamic::Method;
 use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError};
@@ -15,6 +15,7 @@ use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError};
 use crate::cpu;
 use crate::detector::{self, DetectorArgs, LoadedDetector, ModelIdentity, Took};
 use crate::pipeline::Stages;
+use crate::settings::describe;
 use crate::source::SourceArgs;
 use crate::terminal::Terminal;
 
@@ -28,6 +29,8 @@ pub enum BoxOrigin {
     Renderer,
     /// The `boxes.json` of the folder.
     Folder,
+    /// None: masks tell what can move.
+    Masks,
     /// A network.
     Detector(ModelIdentity),
 }
@@ -45,6 +48,7 @@ impl fmt::Display for BoxOrigin {
             Self::None => f.write_str("none needed"),
             Self::Renderer => f.write_str("exact, from the renderer"),
             Self::Folder => f.write_str("exact, from the recording's boxes.json"),
+            Self::Masks => f.write_str("none; masks tell what can move"),
             Self::Detector(model) => model.fmt(f),
         }
     }
@@ -53,7 +57,7 @@ impl fmt::Display for BoxOrigin {
 /// The origin of the boxes that `methods` need, and the detector if it is one.
 ///
 /// # Errors
-/// The detector cannot be used.
+/// The detector cannot be used, or there are masks alone and a method cannot use them.
 pub fn choose(
     args: &DetectorArgs,
     source: &SourceArgs,
@@ -63,6 +67,16 @@ pub fn choose(
 ) -> Result<(BoxOrigin, Option<LoadedDetector>)> {
     if !methods.iter().any(|method| method.needs_boxes()) {
         return Ok((BoxOrigin::None, None));
+    }
+    if args.detector.is_none() && source.masks.is_some() {
+        if let Some(method) = methods.iter().find(|method| matches!(method, Method::Boxes | Method::Yf)) {
+            let (name, _) = describe(*method);
+            bail!(
+                "method {name} works on boxes alone; add --detector embedded to find them, or leave it out of --method"
+            );
+        }
+        terminal.note("no --detector: the masks alone tell what can move");
+        return Ok((BoxOrigin::Masks, None));
     }
     if args.detector.is_none() && source.is_synthetic() {
         terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
@@ -86,6 +100,11 @@ pub struct SharedDetector {
     /// Indices of the classes that can move.
     movable: Vec<usize>,
     found: Vec<Detection>,
+    /// As `dynamic.detect_every`.
+    every: usize,
+    /// Frames that no method refuses for their time, and the time of the last of them, ns.
+    frames: usize,
+    last_ns: Option<i64>,
     tally: DetectionTally,
 }
 
@@ -117,11 +136,30 @@ impl SharedDetector {
             known.iter().position(|k| k == name).ok_or_else(unknown)
         };
         let movable = config.dynamic.movable.iter().map(index).collect::<Result<_, _>>()?;
-        Ok(Self { detector, times, movable, found: Vec::new(), tally: DetectionTally::default() })
+        let (found, tally) = (Vec::new(), DetectionTally::default());
+        Ok(Self {
+            detector,
+            times,
+            movable,
+            found,
+            every: config.dynamic.detect_every,
+            frames: 0,
+            last_ns: None,
+            tally,
+        })
     }
 
-    /// Puts its boxes into the frame.
+    /// Puts its boxes into the frame, or none where no method asks for any.
     pub fn see(&mut self, frame: &mut RgbdFrame) {
+        frame.detections = Some(Vec::new());
+        if self.last_ns.is_some_and(|last_ns| last_ns >= frame.timestamp_ns) {
+            return;
+        }
+        self.last_ns = Some(frame.timestamp_ns);
+        self.frames += 1;
+        if !(self.frames - 1).is_multiple_of(self.every) {
+            return;
+        }
         if let Err(error) = self.detector.detect(&frame.color, &mut self.found) {
             tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
             self.found.clear();

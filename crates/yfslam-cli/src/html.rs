@@ -44,7 +44,7 @@ fn page(runs: &[Run], shared: &Stages) -> Result<String> {
         shared_stages: stages(shared),
         wall_s,
         version: env!("CARGO_PKG_VERSION"),
-        command: command(),
+        command: command_line(),
     };
     Ok(report.html())
 }
@@ -107,7 +107,7 @@ fn facts(run: &Run, boxes: &BoxOrigin) -> Vec<(&'static str, String)> {
 }
 
 /// The command that was given, ready to be given again.
-fn command() -> String {
+pub fn command_line() -> String {
     let arguments = std::env::args_os().skip(1).map(|argument| quote(&argument.to_string_lossy()));
     ["yfslam".to_owned()].into_iter().chain(arguments).collect::<Vec<_>>().join(" ")
 }

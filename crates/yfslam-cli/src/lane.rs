@@ -3,7 +3,6 @@
 //! In: frames, which several lanes may share. Out: a [`Judged`] run, its files written.
 
 use anyhow::Result;
-use yfslam::dynamic::Method;
 use yfslam::tracking::TrackingState;
 use yfslam::{Config, RgbdFrame, Slam};
 use yfslam_eval::report::Picture;

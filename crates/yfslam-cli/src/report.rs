@@ -9,7 +9,7 @@ use yfslam_io::sequence::AssociationReport;
 use crate::boxes::BoxOrigin;
 use crate::lane::Judged;
 use crate::pipeline::{DynamicTally, FrameTally, PlaceTally, Stages};
-use crate::source::{Source, Truth};
+use crate::source::{MaskTally, Source, Truth};
 
 /// What a report is made of.
 #[derive(Clone, Copy)]
@@ -32,6 +32,8 @@ pub struct Report<'a> {
     pub camera: &'a Camera,
     /// Where the boxes of movable objects come from.
     pub boxes: &'a BoxOrigin,
+    /// Which frames had a mask, where masks were asked for.
+    pub masks: Option<&'a MaskTally>,
     /// Faults put into the frames on purpose.
     pub faults: Vec<String>,
     pub frames: &'a FrameTally,
@@ -88,6 +90,7 @@ impl<'a> Report<'a> {
             camera_origin: &source.camera.origin,
             camera: &source.camera.camera,
             boxes,
+            masks: source.masks.as_ref(),
             faults: faults.iter().map(ToString::to_string).collect(),
             frames: &outcome.frames,
             association: source.association.as_ref().map(Association::from),

@@ -18,6 +18,13 @@ pub struct SettingsArgs {
     /// Seed of every random draw [default: 0].
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: Option<u64>,
+    /// Frames from one look of the detector to the next [default: 1]. Over those between, tracks are carried without boxes.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
+    pub detect_every: Option<u32>,
+    /// Use boxes when they are ready, perhaps some frames late: no frame waits for the detector once there is a map. For live use on
+    /// small boards, with --threaded; results then differ from run to run.
+    #[arg(long)]
+    pub detect_async: bool,
     /// Settings that differ from the defaults; `yfslam config` prints them all.
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
@@ -103,6 +110,8 @@ impl SettingsArgs {
             None => {}
         }
         dynamic.seed = self.seed.unwrap_or(dynamic.seed);
+        dynamic.detect_every = self.detect_every.map_or(dynamic.detect_every, |every| every as usize);
+        dynamic.detect_async |= self.detect_async;
         Ok(config)
     }
 }

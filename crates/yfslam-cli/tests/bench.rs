@@ -31,6 +31,13 @@ fn a_bench_goes_on_where_it_stopped_and_tells_worlds_and_folders_alike() {
         assert!(first.stdout.contains(row), "no '{row}' in {}", first.stdout);
     }
     assert_eq!(fs::read_to_string(root.join("b/cells.csv")).unwrap().lines().count(), 9);
+    let [page, text, ate] = ["report.html", "table.md", "tables/ate.csv"]
+        .map(|name| fs::read_to_string(root.join("b").join(name)).unwrap());
+    for table in ["Table 2", "Table 3", "Table 4", "Table 5", "Frames tracked"] {
+        assert!(page.contains(table) && text.contains(table), "no {table}");
+    }
+    assert_eq!(ate.lines().count(), 5);
+    assert!(!page.contains("published: ") && !ate.contains("published: "), "nothing was published about these");
     let before = cells(root);
     assert_eq!(before.len(), 8);
     // One method is missing, both methods of another are, one of them cut in half: they are run again, the others are not.
@@ -67,10 +74,36 @@ fn a_method_that_fails_is_a_cell_that_says_so_and_the_others_have_their_figures(
     succeeds(root, &[&args[..], &["--", "--overlay"]].concat());
     let csv = fs::read_to_string(root.join("b/cells.csv")).unwrap();
     let line = |method: &str| csv.lines().find(|line| line.contains(&format!(",{method},1,"))).unwrap();
-    assert!(line("none").contains(",none,1,,,,,,\"") && line("none").contains("overlay"), "{csv}");
+    assert!(line("none").contains(",none,1,,,,,,,,,,\"") && line("none").contains("overlay"), "{csv}");
     assert!(line("yf").contains(",yf,1,0.") && line("yf").ends_with(','), "{csv}");
     // A run that does not begin.
     let output = succeeds(root, &[&args[..], &["--", "--depth-factor", "5"]].concat());
     assert!(output.stderr.contains("leave out --depth-factor"), "{}", output.stderr);
     fails(root, &["bench", "nowhere"], &["nowhere is no folder", "walking_xyz"]);
+}
+
+#[test]
+fn a_folder_of_sequences_is_run_and_known_names_stand_beside_what_was_published() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    for name in ["rgbd_bonn_crowd", "other"] {
+        record(&root.join("data").join(name));
+        fs::write(root.join("data").join(name).join("boxes.json"), r#"{"classes":["person"],"frames":[]}"#).unwrap();
+    }
+    let table = |out: &str| fs::read_to_string(root.join(out).join("tables/ate.csv")).unwrap();
+    succeeds(root, &["bench", "data", "--methods", "none", "--seeds", "1", "--out", "all"]);
+    let rows = table("all");
+    assert!(rows.contains("\nother,none,") && rows.contains("\nrgbd_bonn_crowd,none,"), "{rows}");
+    let quoted: Vec<&str> = rows.lines().filter(|line| line.contains("published: ")).collect();
+    assert!(quoted.len() == 4 && quoted.iter().all(|line| line.starts_with("rgbd_bonn_crowd,")), "{rows}");
+    // A part of it is something else.
+    let known = ["bench", "--known", "data", "--methods", "none", "--seeds", "1"];
+    let output = succeeds(root, &[&known[..], &["--frames", "8", "--out", "part"]].concat());
+    assert!(!table("part").contains("published: ") && !table("part").contains("other"), "{}", table("part"));
+    for words in ["23 of 24", "rgbd_bonn_crowd2", "9 of 9", "rgbd_dataset_freiburg3_walking_rpy", "ipb.uni-bonn.de"] {
+        assert!(output.stderr.contains(words), "no '{words}' in {}", output.stderr);
+    }
+    assert!(fs::read_to_string(root.join("part/table.md")).unwrap().contains("rgbd_bonn_crowd2"));
+    fails(root, &["bench", "--known", "data/other"], &["none of the known", "walking_xyz"]);
+    fails(root, &["bench", "data/other/rgb"], &["lists of images"]);
 }

@@ -56,6 +56,17 @@ fn methods_share_a_detector_and_leave_what_each_leaves_with_its_own() {
 }
 
 #[test]
+fn a_detector_that_looks_at_every_third_frame_does_so_for_one_method_and_for_several() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_same_together_and_alone(folder.path(), &["run", WALKING, "--detector", "embedded", "--detect-every", "3"]);
+    for out in ["yf", "all/yf"] {
+        let report = report(&folder.path().join(out));
+        assert_eq!(report["times"]["detector"]["count"].as_u64(), Some(10), "{out}");
+        assert_eq!(report["config"]["dynamic"]["detect_every"].as_u64(), Some(3));
+    }
+}
+
+#[test]
 fn a_recording_without_boxes_is_looked_at_by_the_network_in_the_program() {
     let folder = tempfile::tempdir().unwrap();
     record(&folder.path().join("seq"));

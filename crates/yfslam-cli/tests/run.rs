@@ -108,3 +108,26 @@ fn quiet_means_quiet() {
     let output = yfslam(folder.path(), &["run", "seq", "--method", "none", "--quiet"]);
     assert_eq!((output.success, output.stdout.as_str(), output.stderr.as_str()), (true, "", ""));
 }
+
+#[test]
+fn a_walk_is_tracked_with_boxes_on_every_fifth_frame_and_with_a_detector_that_nobody_waits_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let every = |n: &str| {
+        succeeds(folder.path(), &["run", WALKING, "--detect-every", n, "--out", n, "-q"]);
+        report(&folder.path().join(n))
+    };
+    let [all, fifth] = ["1", "5"].map(every);
+    assert!(ate_rmse(&fifth) < 0.010, "{}", ate_rmse(&fifth));
+    let boxes = |report: &serde_json::Value| report["dynamic"]["boxes"].as_u64().unwrap();
+    assert!(boxes(&fifth) > 0 && 4 * boxes(&fifth) < boxes(&all), "{} of {}", boxes(&fifth), boxes(&all));
+    let live = ["run", WALKING, "--detector", "embedded", "--detect-async"];
+    let refused = yfslam(folder.path(), &live);
+    assert!(!refused.success && refused.stderr.contains("--threaded"), "{}", refused.stderr);
+    succeeds(folder.path(), &[&live[..], &["--threaded", "--out", "live", "-q"]].concat());
+    let live = report(&folder.path().join("live"));
+    assert_eq!(live["frames"]["tracked"], 40);
+    let looks = live["times"]["detector"]["count"].as_u64().unwrap();
+    assert!((1..=40).contains(&looks), "{looks}");
+    let refused = yfslam(folder.path(), &["run", WALKING, "--detect-every", "0"]);
+    assert!(!refused.success && refused.stderr.contains("detect-every"), "{}", refused.stderr);
+}

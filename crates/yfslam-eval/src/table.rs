@@ -1,4 +1,4 @@
-//! In: headers and cells. Out: an aligned table, as plain text for a terminal or as Markdown.
+//! In: headers and cells. Out: an aligned table, as plain text for a terminal or as Markdown, or its cells as CSV.
 
 /// How a table is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -8,6 +8,8 @@ pub enum TableStyle {
     Plain,
     /// GitHub Markdown, aligned in its source as well.
     Markdown,
+    /// Comma-separated values (RFC 4180): cells with a comma, a quote or a line break are quoted.
+    Csv,
 }
 
 /// A table; its first column is aligned left, the others right.
@@ -27,9 +29,20 @@ impl Table {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
+    /// Headers, then rows.
+    pub fn rows(&self) -> &[Vec<String>] {
+        &self.rows
+    }
+
     /// The table as text; each line ends with a newline and without trailing spaces.
     pub fn render(&self, style: TableStyle) -> String {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        if style == TableStyle::Csv {
+            let line = |row: &Vec<String>| {
+                (0..columns).map(|c| quoted(row.get(c).map_or("", String::as_str))).collect::<Vec<_>>().join(",") + "\n"
+            };
+            return self.rows.iter().map(line).collect();
+        }
         let cell = |row: &[String], column: usize| match row.get(column) {
             // A bar would end the Markdown cell.
             Some(text) if style == TableStyle::Markdown => text.replace('|', "\\|"),
@@ -41,8 +54,8 @@ impl Table {
         let widths: Vec<usize> = (0..columns).map(|c| width(c).max(3)).collect();
 
         let line = |cells: Vec<String>| match style {
-            TableStyle::Plain => format!("{}\n", cells.join("  ").trim_end()),
             TableStyle::Markdown => format!("| {} |\n", cells.join(" | ")),
+            _ => format!("{}\n", cells.join("  ").trim_end()),
         };
         let rule = |(column, &width): (usize, &usize)| match style {
             TableStyle::Markdown if column > 0 => format!("{}:", "-".repeat(width - 1)),
@@ -61,6 +74,11 @@ impl Table {
         }
         text
     }
+}
+
+/// A cell as CSV takes it.
+fn quoted(cell: &str) -> String {
+    if cell.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
 }
 
 #[cfg(test)]
@@ -85,5 +103,13 @@ mod tests {
         let expected = "| sequence |   RMSE |    n |\n| -------- | -----: | ---: |\n| crowd\\|1 | 0.0156 | 1200 |\n\
                         | größer   |   12.0 |      |\n";
         assert_eq!(example().render(TableStyle::Markdown), expected);
+    }
+
+    #[test]
+    fn csv_quotes_what_would_end_a_cell_and_fills_short_rows() {
+        let mut table = Table::new(["a", "b"]);
+        table.push(["walk, \"fast\"", "1"]);
+        table.push(["x"]);
+        assert_eq!(table.render(TableStyle::Csv), "a,b\n\"walk, \"\"fast\"\"\",1\nx,\n");
     }
 }

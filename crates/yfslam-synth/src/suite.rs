@@ -81,7 +81,7 @@ pub const SUITE: &[NamedWorld] = &[
     ),
     world(
         "dark_rescue",
-        "a damaged hall with little texture and failing light; a robot drives through it past people",
+        "a damaged hall with little texture and failing light; a robot drives through it behind two people",
         |c| {
             passing(c, CameraMotion::Drive);
             c.scene = SceneKind::Rescue;

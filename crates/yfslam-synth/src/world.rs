@@ -386,4 +386,14 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn people_cover_a_twentieth_of_the_picture_in_every_world_of_the_suite() {
+        for name in crate::names() {
+            for form in ["seed=1&frames=150", "seed=2"] {
+                let world = World::new(&crate::parse(&format!("{name}?{form}")).unwrap()).unwrap();
+                assert!(world.person_share() > 0.05, "{name}?{form}: {}", world.person_share());
+            }
+        }
+    }
 }

@@ -330,6 +330,12 @@ config_section! {
         grouping: Grouping = Grouping::Exact,
         /// Names of the classes that can move.
         movable: Vec<String> = vec!["person".to_owned()],
+        /// Frames from one look of the detector to the next; 1 has it look at each. Frames between count as frames without boxes, over
+        /// which tracks are carried; boxes that come with the frames are thinned alike.
+        detect_every: usize = 1,
+        /// Whether boxes are used when they are ready, perhaps some frames late, so that no frame waits for the detector once there is a
+        /// map: for boards on which it is slower than the camera. Results then differ from run to run.
+        detect_async: bool = false,
         /// Score at which a box opens a track, and counts for `boxes`. Source: demo threshold of YOLO-FastestV2.
         open_score: f32 = 0.3,
         /// Score at which a box keeps a track.

@@ -1,9 +1,10 @@
 //! The detector on a thread of its own, so that it runs beside feature extraction.
 //!
-//! In: one image a frame. Out: its boxes, joined in the same frame: the result does not depend on timing.
+//! In: one image a frame. Out: its boxes, waited for in the same frame, so that the result does not depend on timing; or taken when they
+//! are ready, so that no frame waits.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::JoinHandle;
 
 use crate::detection::{Detection, Detector, DetectorError};
@@ -18,6 +19,8 @@ pub struct DetectorThread {
     answers: Receiver<Answer>,
     thread: Option<JoinHandle<()>>,
     buffer: Vec<Detection>,
+    /// Whether an image was handed over whose boxes were not taken yet.
+    busy: bool,
 }
 
 impl DetectorThread {
@@ -36,27 +39,46 @@ impl DetectorThread {
                 }
             }
         })?;
-        Ok(Self { requests: Some(requests), answers, thread: Some(thread), buffer: Vec::new() })
+        Ok(Self { requests: Some(requests), answers, thread: Some(thread), buffer: Vec::new(), busy: false })
     }
 
-    /// Hands over the image of this frame. Each start is followed by one [`DetectorThread::finish`].
+    /// Hands over the image of this frame, unless the boxes of an earlier one were not taken yet.
     pub fn start(&mut self, image: &Arc<RgbImage>) {
-        if let Some(requests) = &self.requests {
-            // A thread that is gone shows in `finish`.
+        if let (Some(requests), false) = (&self.requests, self.busy) {
+            // A thread that is gone shows when its boxes are asked for.
             let _ = requests.send((Arc::clone(image), std::mem::take(&mut self.buffer)));
+            self.busy = true;
         }
     }
 
-    /// Waits for the boxes of the image handed over last.
+    /// Waits for the boxes of the image handed over last; `None` if they were taken already.
     ///
-    /// # Errors
-    /// If the detector could not process the image, or its thread has ended.
-    pub fn finish(&mut self) -> Result<&[Detection], DetectorError> {
-        let (result, boxes) =
-            self.answers.recv().map_err(|_| DetectorError("the detector's thread has ended".to_owned()))?;
+    /// The error says that the detector could not process the image, or that its thread has ended.
+    pub fn finish(&mut self) -> Option<Result<&[Detection], DetectorError>> {
+        let answer = self.busy.then(|| self.answers.recv().map_err(|_| ended()))?;
+        Some(self.take(answer))
+    }
+
+    /// The boxes of the image handed over last if they are ready; never waits. Errors as in [`DetectorThread::finish`].
+    pub fn poll(&mut self) -> Option<Result<&[Detection], DetectorError>> {
+        let answer = match self.answers.try_recv() {
+            _ if !self.busy => return None,
+            Err(TryRecvError::Empty) => return None,
+            answer => answer.map_err(|_| ended()),
+        };
+        Some(self.take(answer))
+    }
+
+    fn take(&mut self, answer: Result<Answer, DetectorError>) -> Result<&[Detection], DetectorError> {
+        self.busy = false;
+        let (result, boxes) = answer?;
         self.buffer = boxes;
         result.map(|()| self.buffer.as_slice())
     }
+}
+
+fn ended() -> DetectorError {
+    DetectorError("the detector's thread has ended".to_owned())
 }
 
 impl Drop for DetectorThread {
@@ -94,10 +116,45 @@ mod tests {
         let mut thread = DetectorThread::spawn(Box::new(Widths)).unwrap();
         for width in 10..16 {
             thread.start(&Arc::new(RgbImage::new(width, 2)));
-            match thread.finish() {
+            match thread.finish().unwrap() {
                 Ok(boxes) => assert_eq!(boxes[0].bbox.x_max, width as f32),
                 Err(_) => assert_eq!(width, 13),
             }
+            assert!(thread.finish().is_none() && thread.poll().is_none(), "each answer is given once");
         }
+    }
+
+    /// Answers when told to.
+    struct Slow(Receiver<()>);
+
+    impl Detector for Slow {
+        fn class_names(&self) -> &[String] {
+            &[]
+        }
+
+        fn detect(&mut self, image: &RgbImage, out: &mut Vec<Detection>) -> Result<(), DetectorError> {
+            self.0.recv().map_err(|_| DetectorError("nobody waits".to_owned()))?;
+            Widths.detect(image, out)
+        }
+    }
+
+    #[test]
+    fn polling_never_waits_and_gives_the_boxes_of_the_image_that_was_begun() {
+        let (go, told) = sync_channel(1);
+        let mut thread = DetectorThread::spawn(Box::new(Slow(told))).unwrap();
+        for width in 10..13 {
+            // Busy with the first: the others are passed over.
+            thread.start(&Arc::new(RgbImage::new(width, 2)));
+            assert!(thread.poll().is_none());
+        }
+        go.send(()).unwrap();
+        let boxes = loop {
+            match thread.poll() {
+                Some(boxes) => break boxes.unwrap(),
+                None => std::thread::yield_now(),
+            }
+        };
+        assert_eq!(boxes[0].bbox.x_max, 10.0);
+        assert!(thread.poll().is_none());
     }
 }

@@ -1,5 +1,6 @@
 //! One cell of the table, and the group of cells that one run fills.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Result;
@@ -16,7 +17,7 @@ pub struct Group {
     pub sequence: String,
     /// As `yfslam run` takes it.
     pub source: String,
-    /// `none`, `boxes` or `yf`, each once.
+    /// Names of methods, each once.
     pub methods: Vec<String>,
     /// Of the world, or of the method's random draws.
     pub seed: u64,
@@ -24,6 +25,8 @@ pub struct Group {
     pub options: Vec<String>,
     /// Words that name a detector, for methods that need one.
     pub detector: Vec<String>,
+    /// Whether it is all of a recorded sequence, as it was recorded: only then may it stand beside published figures.
+    pub whole: bool,
 }
 
 impl Group {
@@ -46,20 +49,32 @@ impl Group {
 pub struct Cell {
     /// Name in the table.
     pub sequence: String,
-    /// `none`, `boxes` or `yf`.
+    /// Name of the method.
     pub method: String,
     /// Of the world, or of the method's random draws.
     pub seed: u64,
     /// Absolute trajectory error after alignment by SE(3), RMSE, m.
     pub ate_rmse_m: Option<f64>,
+    /// The same, standard deviation, m.
+    pub ate_std_m: Option<f64>,
     /// Share of the frames whose pose is known.
     pub tracked: Option<f64>,
     /// Relative pose error over a frame, RMSE, m.
     pub rpe_frame_m: Option<f64>,
     /// Relative pose error over a second, RMSE, m.
     pub rpe_second_m: Option<f64>,
+    /// The same, standard deviation, m.
+    pub rpe_second_std_m: Option<f64>,
+    /// Its rotation, RMSE, degrees.
+    pub rpe_second_deg: Option<f64>,
+    /// The same, standard deviation, degrees.
+    pub rpe_second_std_deg: Option<f64>,
+    /// Median wall time of each stage of the run, ms.
+    pub stages_ms: BTreeMap<String, f64>,
     /// Processor time of tracking and detection for a frame, ms.
     pub cpu_ms_per_frame: Option<f64>,
+    /// As of its [`Group`].
+    pub whole: bool,
     /// Why there are no figures.
     pub failure: Option<String>,
     /// Words with which this program runs the cell alone, to the same figures.
@@ -89,15 +104,23 @@ impl Cell {
             _ if ate_rmse_m.is_none() => Some("no ground truth to judge it by".into()),
             _ => None,
         };
+        let stages = run.pointer("/times").and_then(Value::as_object).into_iter().flatten();
+        let median = |(name, stage): (&String, &Value)| Some((name.clone(), stage.get("median_ms")?.as_f64()?));
         Self {
             sequence: group.sequence.clone(),
             method: method.to_owned(),
             seed: group.seed,
             ate_rmse_m,
+            ate_std_m: figure("/evaluation/ate/translation_m/std"),
             tracked: figure("/evaluation/coverage/fraction"),
             rpe_frame_m: figure("/evaluation/rpe/0/translation_m/rmse"),
             rpe_second_m: figure("/evaluation/rpe/1/translation_m/rmse"),
+            rpe_second_std_m: figure("/evaluation/rpe/1/translation_m/std"),
+            rpe_second_deg: figure("/evaluation/rpe/1/rotation_deg/rmse"),
+            rpe_second_std_deg: figure("/evaluation/rpe/1/rotation_deg/std"),
+            stages_ms: stages.filter_map(median).collect(),
             cpu_ms_per_frame: figure("/cpu_s").zip(frames).map(|(cpu_s, frames)| 1e3 * cpu_s / frames),
+            whole: group.whole,
             failure,
             arguments,
             program_crc32,

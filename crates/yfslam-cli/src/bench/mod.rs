@@ -1,9 +1,11 @@
 //! Many runs for one table: a cell is one method on one sequence with one seed. One process runs the methods of a sequence and a seed
 //! together, on frames that are read or rendered once.
 //!
-//! In: what to run. Out: one JSON a cell, which is not run again, then [`table`]s of all of them.
+//! In: what to run. Out: one JSON a cell, which is not run again, then tables of all of them.
 
 mod cell;
+pub mod known;
+mod paper;
 mod table;
 
 use std::path::PathBuf;
@@ -15,7 +17,8 @@ use anyhow::{Context, Result};
 
 use crate::output::FAILURE_FILE;
 pub use cell::{Cell, Group};
-pub use table::{csv, markdown};
+pub use paper::sections;
+pub use table::csv;
 
 /// What a method leaves in its folder when it has ended, well or not.
 const RESULTS: [&str; 2] = ["run.json", FAILURE_FILE];
@@ -150,6 +153,7 @@ echo '{\"evaluation\":{\"ate\":{\"translation_m\":{\"rmse\":0.5}}}}' > \"$out/ru
             seed: 1,
             options: Vec::new(),
             detector: Vec::new(),
+            whole: false,
         };
         let cells = bench.cells(&[group], |_| {}).unwrap();
         let figures: Vec<_> = cells.iter().map(|cell| (cell.ate_rmse_m, cell.failure.as_deref())).collect();

@@ -20,7 +20,7 @@ use crate::pipeline::Stages;
 use crate::progress::Progress;
 use crate::report::{Report, Run};
 use crate::settings::{MethodArg, SettingsArgs, describe};
-use crate::source::{Source, SourceArgs, Truth};
+use crate::source::{MaskTally, Source, SourceArgs, Truth};
 use crate::summary;
 use crate::terminal::{Terminal, explain};
 
@@ -33,6 +33,8 @@ Examples:
   yfslam run DIR --start 100 --end 400 --reverse --overlay --report
   yfslam run DIR --save-map lab.map                    then, another day:
   yfslam run OTHER --load-map lab.map --localise
+  yfslam run DIR --masks DIR/masks                     what can move, from a segmentation of your own
+  yfslam run DIR --detect-every 3                      the network looks at every third frame
   yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
 
 In the output folder:
@@ -101,6 +103,9 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let max_diff_ns = args.matching.max_diff_ns()?;
     let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
     let mut source = args.source.open(boxes.is_source().then_some(&*config.dynamic.movable))?;
+    if let Some(masks) = &source.masks {
+        tell(masks, terminal);
+    }
     let truth = find_truth(args, &source, terminal)?;
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
     args.map.check()?;
@@ -155,6 +160,10 @@ impl RunArgs {
         if methods.is_empty() {
             methods.push(config.dynamic.method);
         }
+        ensure!(
+            !config.dynamic.detect_async || self.map.threaded,
+            "--detect-async (dynamic.detect_async) is for live use, whose results differ from run to run; add --threaded"
+        );
         let options = self.map.of_one_method();
         ensure!(
             methods.len() == 1 || options.is_empty(),
@@ -162,6 +171,18 @@ impl RunArgs {
             options.join(" and ")
         );
         Ok(methods)
+    }
+}
+
+/// How many frames have a mask.
+fn tell(masks: &MaskTally, terminal: Terminal) {
+    let MaskTally { folder, found, missing, first_missing } = masks;
+    terminal.note(&format!("{found} of {} frames have a mask in {}", found + missing, folder.display()));
+    if let Some(first) = first_missing {
+        terminal.warn(&format!(
+            "{missing} frames have no mask, and nothing is masked in them; the first: {}",
+            first.display()
+        ));
     }
 }
 

@@ -29,7 +29,7 @@ In the folder:
   groundtruth.txt  the exact pose of every frame, whatever faults were put in
   camera.toml      the camera
   boxes.json       class, instance and exact box of everything that can move; `yfslam run` takes them where no --detector is given
-  masks/           per frame, named by its time: 0 where the world stands still, else the instance
+  masks/           per frame, named by its time: 0 where the world stands still, else the instance; for `yfslam run --masks`
   world.toml       every setting of the world";
 
 /// Write a synthetic world to a folder: colour, depth, exact poses, boxes and masks.

@@ -1,9 +1,11 @@
 //! Recorded sequences in TUM RGB-D or Bonn layout.
 
 use std::io::ErrorKind;
+use std::time::Instant;
 
 use anyhow::{Result, ensure};
 use yfslam::{Camera, Detection, RgbdFrame};
+use yfslam_io::boxes::KnownDetections;
 use yfslam_io::camera::check_camera;
 use yfslam_io::decode::DecodeError;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
@@ -12,7 +14,8 @@ use yfslam_io::{
     load_camera,
 };
 
-use super::{FolderBoxes, Frames, Player, Skip, Source, SourceArgs};
+use super::masks::Masks;
+use super::{FolderKnowledge, Frames, Player, Skip, Source, SourceArgs};
 use crate::pipeline::Stages;
 
 /// Frames of the whole sequence that are tried where the first ones are unusable.
@@ -27,20 +30,24 @@ pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
     }
     check(&sequence, &camera.camera)?;
     let boxes = match own_boxes {
-        Some(classes) => {
-            let detections = BoxList::read(&args.boxes_file())?.detections(classes);
-            Some(FolderBoxes { detections, mirror: sequence.mirror })
-        }
+        Some(classes) => Some(BoxList::read(&args.boxes_file())?.detections(classes)),
         None => None,
     };
+    let masks = args.masks.as_deref().map(|folder| Masks::open(folder, &sequence, &camera.camera)).transpose()?;
+    let tally = masks.as_ref().map(|masks| masks.tally.clone());
     let stream = FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?;
     let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();
     Ok(Source {
         name: name(args),
         camera,
-        frames: Frames::new(Player::Folder(stream, boxes), args, &stamps_ns),
+        frames: Frames::new(
+            Player::Folder(stream, FolderKnowledge { boxes, mirror: sequence.mirror, masks }),
+            args,
+            &stamps_ns,
+        ),
         stamps_ns,
         association: Some(sequence.report),
+        masks: tally,
         mirror: sequence.mirror,
     })
 }
@@ -96,29 +103,36 @@ fn name(args: &SourceArgs) -> String {
     folder.file_name().map_or("sequence".into(), |name| name.to_string_lossy().into_owned())
 }
 
-pub fn next(
-    stream: &mut FrameStream,
-    boxes: Option<&FolderBoxes>,
-    stages: &mut Stages,
-) -> Option<Result<RgbdFrame, Skip>> {
+pub fn next(stream: &mut FrameStream, known: &FolderKnowledge, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
     let before = stream.times();
     let frame = stream.next()?;
     let after = stream.times();
     stages.push("decode color", after.color - before.color);
     stages.push("decode depth", after.depth - before.depth);
     stages.push("decode wait", after.waited - before.waited);
-    let frame = frame.map(|frame| match boxes {
-        Some(boxes) => RgbdFrame { detections: Some(boxes.at(frame.timestamp_ns)), ..frame },
-        None => frame,
-    });
-    Some(frame.map_err(|error| Skip { reason: reason(&error.fault), message: error.to_string() }))
+    let frame = frame.map_err(|error| Skip { reason: reason(&error.fault), message: error.to_string() });
+    Some(frame.and_then(|frame| known.add_to(frame, stages)))
 }
 
-impl FolderBoxes {
+impl FolderKnowledge {
+    /// The frame with its boxes and its mask.
+    fn add_to(&self, frame: RgbdFrame, stages: &mut Stages) -> Result<RgbdFrame, Skip> {
+        let detections = self.boxes.as_ref().map(|boxes| self.boxes_at(boxes, frame.timestamp_ns));
+        let started = Instant::now();
+        let mask = match &self.masks {
+            Some(masks) => masks.at(frame.timestamp_ns)?,
+            None => None,
+        };
+        if self.masks.is_some() {
+            stages.push("decode mask", started.elapsed());
+        }
+        Ok(RgbdFrame { detections, mask, ..frame })
+    }
+
     /// The boxes of the frame that is played at this time; none if the file does not list it.
-    fn at(&self, played_ns: i64) -> Vec<Detection> {
+    fn boxes_at(&self, boxes: &KnownDetections, played_ns: i64) -> Vec<Detection> {
         let recorded_ns = self.mirror.map_or(played_ns, |mirror| mirror.apply(played_ns));
-        self.detections.get(&recorded_ns).cloned().unwrap_or_default()
+        boxes.get(&recorded_ns).cloned().unwrap_or_default()
     }
 }
 

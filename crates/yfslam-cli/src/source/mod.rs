@@ -3,6 +3,7 @@
 //! In: what the user named. Out: a [`Source`], which a SLAM system may see, and the truth, which it may not.
 
 mod folder;
+mod masks;
 mod synth;
 
 use std::path::{Path, PathBuf};
@@ -22,6 +23,8 @@ use crate::accuracy::{read_poses, to_eval};
 use crate::pipeline::Stages;
 use crate::terminal::Terminal;
 pub use folder::{camera, open_sequence};
+pub use masks::MaskTally;
+use masks::Masks;
 pub use synth::{Renderer, world_camera};
 
 /// How far apart a colour and a depth image may be. Source: the tool of the TUM RGB-D benchmark.
@@ -44,6 +47,10 @@ pub struct SourceArgs {
     /// How far apart a colour and a depth image may be, ms.
     #[arg(long, value_name = "MS", default_value_t = ASSOCIATION_TOLERANCE_MS, allow_negative_numbers = true)]
     pub association_tolerance: f64,
+    /// Masks of movable objects, a PNG for each colour image and named like it (or by its time, or listed in `masks.txt`): 0 where
+    /// there is none. Methods `ds`, `dyna` and `full` use them, and then need no boxes.
+    #[arg(long, value_name = "DIR")]
+    pub masks: Option<PathBuf>,
     /// First frame, counted from 0.
     #[arg(long, value_name = "I", default_value_t = 0)]
     pub start: usize,
@@ -71,6 +78,8 @@ pub struct Source {
     pub stamps_ns: Vec<i64>,
     /// What was left out when colour and depth were paired; `None` for synthetic worlds.
     pub association: Option<AssociationReport>,
+    /// Which frames have a mask, where masks were asked for.
+    pub masks: Option<MaskTally>,
     /// Set when the sequence is played backward.
     pub mirror: Option<TimeMirror>,
 }
@@ -101,15 +110,16 @@ pub struct Frames {
 /// What frames are made of.
 enum Player {
     /// Files.
-    Folder(FrameStream, Option<FolderBoxes>),
+    Folder(FrameStream, FolderKnowledge),
     /// A world.
     Synth(Renderer),
 }
 
-/// What a folder knows about the boxes in its frames.
-struct FolderBoxes {
-    detections: KnownDetections,
+/// What is known about the frames of a folder besides their images.
+struct FolderKnowledge {
+    boxes: Option<KnownDetections>,
     mirror: Option<TimeMirror>,
+    masks: Option<Masks>,
 }
 
 impl Frames {
@@ -125,7 +135,7 @@ impl Frames {
                 return Some(usable(delivery));
             }
             let frame = match &mut self.player {
-                Player::Folder(stream, boxes) => folder::next(stream, boxes.as_ref(), stages),
+                Player::Folder(stream, known) => folder::next(stream, known, stages),
                 Player::Synth(renderer) => renderer.next(stages).map(Ok),
             };
             match frame {
@@ -161,6 +171,7 @@ impl SourceArgs {
             sequence,
             camera: None,
             depth_factor: None,
+            masks: None,
             association_tolerance: ASSOCIATION_TOLERANCE_MS,
             start: 0,
             end: None,
@@ -184,6 +195,9 @@ impl SourceArgs {
     pub fn world(&self) -> Result<WorldConfig> {
         if self.depth_factor.is_some() {
             bail!("a synthetic world has the depth factor of its camera; leave out --depth-factor");
+        }
+        if self.masks.is_some() {
+            bail!("masks belong to the images of a folder; write the world with `yfslam synth` to run it with --masks");
         }
         let camera = match &self.camera {
             Some(spec) => load_camera(spec, None)?.camera,

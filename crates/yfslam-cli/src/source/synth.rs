@@ -63,6 +63,7 @@ pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
         frames: Frames::new(Player::Synth(renderer), args, &stamps_ns),
         stamps_ns,
         association: None,
+        masks: None,
     })
 }
 

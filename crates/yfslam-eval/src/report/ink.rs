@@ -24,13 +24,14 @@ pub enum Ink {
 }
 
 /// Light and dark colours of methods; told apart with any kind of colour vision (the first three by luminance as well).
-const METHODS: [[Rgb; 2]; 6] = [
+const METHODS: [[Rgb; 2]; 7] = [
     [[201, 79, 17], [255, 146, 76]],
     [[118, 75, 205], [183, 155, 255]],
     [[0, 133, 124], [45, 212, 191]],
     [[29, 98, 196], [110, 168, 254]],
     [[186, 40, 110], [244, 128, 180]],
     [[110, 110, 20], [205, 205, 90]],
+    [[52, 130, 48], [120, 210, 104]],
 ];
 
 impl Ink {
@@ -40,6 +41,10 @@ impl Ink {
             "none" => 0,
             "boxes" => 1,
             "yf" => 2,
+            "full" => 3,
+            "ds" => 4,
+            "dyna" => 5,
+            "dms" => 6,
             _ => 3 + place % (METHODS.len() - 3),
         })
     }

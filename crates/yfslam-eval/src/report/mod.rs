@@ -22,9 +22,11 @@ mod path;
 mod scene;
 mod series;
 mod tables;
+mod tables_page;
 mod views;
 
 use crate::{Evaluation, StampedPose};
+pub use tables_page::{IMPROVEMENT, ORIGIN, PUBLISHED, TableSection, TablesPage};
 
 /// What a report is about.
 #[derive(Clone, Debug)]

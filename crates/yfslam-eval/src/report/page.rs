@@ -13,7 +13,8 @@ use super::views::views;
 use super::{MethodReport, Picture, Report, tables};
 use crate::improvement_percent;
 
-const STYLE: &str = include_str!("style.css");
+/// The style sheet of all pages.
+pub const STYLE: &str = include_str!("style.css");
 
 /// The whole page.
 pub fn page(report: &Report) -> Markup {

@@ -1,4 +1,5 @@
-//! Image files in memory to pixels: PNG and JPEG for colour, 16-bit grey PNG for depth; the content decides, not the file's name.
+//! Image files in memory to pixels: PNG and JPEG for colour, 16-bit grey PNG for depth, PNG for masks; the content decides, not the
+//! file's name.
 
 mod jpeg;
 mod png;
@@ -59,6 +60,7 @@ pub enum DecodeError {
 
 const COLOR_SIZE_CURE: &str = "give the camera file of this recording (camera.yaml)";
 const DEPTH_SIZE_CURE: &str = "register depth to colour, so that both have the same size";
+const MASK_SIZE_CURE: &str = "make masks from the colour images as they are";
 const COLOR_KIND_CURE: &str = "colour images are 8-bit grey, RGB, RGBA or palette PNG, or JPEG";
 const DEPTH_KIND_CURE: &str = "depth images are 16-bit grey PNG";
 
@@ -83,6 +85,21 @@ pub fn decode_depth(bytes: &[u8], expected: Option<ImageSize>, into: &mut Image<
         Format::Png => png::decode_depth(bytes, expected, into),
         Format::Jpeg => {
             Err(DecodeError::WrongKind { found: "a JPEG, which holds no depth".into(), cure: DEPTH_KIND_CURE })
+        }
+        Format::Other(name) => Err(DecodeError::UnknownFormat(name)),
+    }
+}
+
+/// Decodes a mask, a PNG of any kind, into `into`, whose buffer is used again: 0 where every colour of the pixel is 0, whatever its
+/// transparency; else the largest byte of its colours, which of 8-bit grey is the value itself.
+///
+/// # Errors
+/// [`DecodeError`]; a size other than `expected` is found out before any pixel is decoded.
+pub fn decode_mask(bytes: &[u8], expected: Option<ImageSize>, into: &mut Image<u8>) -> Result<(), DecodeError> {
+    match Format::of(bytes) {
+        Format::Png => png::decode_mask(bytes, expected, into),
+        Format::Jpeg => {
+            Err(DecodeError::WrongKind { found: "a JPEG, whose zeros are not exact".into(), cure: "masks are PNG" })
         }
         Format::Other(name) => Err(DecodeError::UnknownFormat(name)),
     }

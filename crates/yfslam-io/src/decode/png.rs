@@ -5,7 +5,10 @@ use std::io::Cursor;
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 use yfslam::image::{Image, RgbImage};
 
-use super::{COLOR_KIND_CURE, COLOR_SIZE_CURE, DEPTH_KIND_CURE, DEPTH_SIZE_CURE, DecodeError, ImageSize, check_size};
+use super::{
+    COLOR_KIND_CURE, COLOR_SIZE_CURE, DEPTH_KIND_CURE, DEPTH_SIZE_CURE, DecodeError, ImageSize, MASK_SIZE_CURE,
+    check_size,
+};
 
 type PngReader<'a> = Reader<Cursor<&'a [u8]>>;
 
@@ -45,6 +48,26 @@ pub fn decode_depth(bytes: &[u8], expected: Option<ImageSize>, into: &mut Image<
     into.resize(size.width, size.height);
     read_pixels(&mut reader, bytemuck::cast_slice_mut(into.data_mut()))?;
     into.data_mut().iter_mut().for_each(|depth| *depth = u16::from_be(*depth));
+    Ok(())
+}
+
+pub fn decode_mask(bytes: &[u8], expected: Option<ImageSize>, into: &mut Image<u8>) -> Result<(), DecodeError> {
+    let mut reader = open(bytes, Transformations::EXPAND)?;
+    let size = size_of(&reader);
+    check_size(size, expected, MASK_SIZE_CURE)?;
+    into.resize(size.width, size.height);
+    let (kind, depth) = reader.output_color_type();
+    let bytes_of = |samples: usize| samples * if depth == BitDepth::Sixteen { 2 } else { 1 };
+    let (all, of_color) = match kind {
+        ColorType::GrayscaleAlpha => (bytes_of(2), bytes_of(1)),
+        ColorType::Rgba => (bytes_of(4), bytes_of(3)),
+        kind => (bytes_of(kind.samples()), bytes_of(kind.samples())),
+    };
+    let mut pixels = vec![0; size.width * size.height * all];
+    read_pixels(&mut reader, &mut pixels)?;
+    for (value, pixel) in into.data_mut().iter_mut().zip(pixels.chunks_exact(all)) {
+        *value = pixel.iter().take(of_color).copied().max().unwrap_or(0);
+    }
     Ok(())
 }
 

@@ -56,6 +56,28 @@ fn depth_keeps_all_sixteen_bits() {
     assert_eq!(depth(&depth_png()).unwrap().data(), [0, 1, 256, 5000, 65535, 7]);
 }
 
+fn mask(bytes: &[u8]) -> Result<Vec<u8>, DecodeError> {
+    let mut image = Image::default();
+    decode_mask(bytes, Some(SIZE), &mut image).map(|()| image.data().to_vec())
+}
+
+#[test]
+fn a_mask_is_0_where_a_png_of_any_kind_is_black() {
+    use ::png::{BitDepth::*, ColorType::*};
+    assert_eq!(mask(&png(Grayscale, Eight, &[0, 1, 2, 0, 255, 7])).unwrap(), [0, 1, 2, 0, 255, 7]);
+    let deep: Vec<u8> = [0u16, 1, 256, 5000, 65535, 0].iter().flat_map(|v| v.to_be_bytes()).collect();
+    let found: Vec<bool> = mask(&png(Grayscale, Sixteen, &deep)).unwrap().iter().map(|value| *value > 0).collect();
+    assert_eq!(found, [false, true, true, true, true, false]);
+    assert_eq!(mask(&png(Grayscale, One, &[0b0100_0000, 0b0010_0000])).unwrap(), [0, 255, 0, 0, 0, 255]);
+    // Transparency alone is not something.
+    assert_eq!(mask(&png(GrayscaleAlpha, Eight, &[0, 9, 3, 0, 0, 9, 0, 9, 0, 9, 0, 9])).unwrap(), [0, 3, 0, 0, 0, 0]);
+    let error = mask(JPEG).unwrap_err().to_string();
+    assert!(error.contains("JPEG") && error.contains("masks are PNG"), "{error}");
+    let error = decode_mask(&depth_png(), Some(ImageSize { width: 4, height: 2 }), &mut Image::default());
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("3×2") && error.contains("4×2") && error.contains("colour images"), "{error}");
+}
+
 #[test]
 fn a_jpeg_is_decoded_close_to_what_was_drawn() {
     let image = color(JPEG).unwrap();
@@ -124,7 +146,7 @@ proptest! {
     fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), magic in 0..3usize) {
         let head: &[u8] = [&b"\x89PNG\r\n\x1a\n"[..], &b"\xff\xd8\xff"[..], b""][magic];
         let bytes = [head, &bytes].concat();
-        let _ = (color(&bytes), depth(&bytes));
+        let _ = (color(&bytes), depth(&bytes), mask(&bytes));
     }
 
     #[test]
@@ -134,6 +156,6 @@ proptest! {
             let at = at.index(bytes.len());
             bytes[at] = value;
         }
-        let _ = (color(&bytes), depth(&bytes));
+        let _ = (color(&bytes), depth(&bytes), mask(&bytes));
     }
 }

@@ -4,8 +4,8 @@
 //! an oval in an oval around the furniture. All go the same way, two abreast: to a camera, several people who stroll past
 //! together are harder than people who stand, or cross each other, because most of what it sees then moves alike.
 //!
-//! Where a camera that goes on a tour would run into them, as in a corridor, people walk that tour themselves: every second one
-//! ahead of the camera, the others towards it and past it.
+//! Where a camera that goes on a tour would run into them, or see none of them, people walk that tour themselves: ahead of the
+//! camera, and where there is room, as in a corridor, every second one towards it and past it.
 
 use super::companion::{Companion, Manner};
 use super::people::tasks::HANDLING_S;
@@ -13,7 +13,7 @@ use super::walkway::{Step, Stop, Walkway};
 use crate::camera_path::{CameraPath, WALK};
 use crate::config::{Activity, WorldConfig};
 use crate::rng::Rng;
-use crate::scene::Scene;
+use crate::scene::{Company, Scene};
 use crate::tour::Tour;
 
 const LANE_M: f64 = 0.5;
@@ -78,26 +78,29 @@ fn lane_of(k: usize) -> usize {
 
 /// The way of number `k` of those who go round, for a closeness up to 2.
 pub fn way(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize, closeness: f64) -> Way {
-    match (path.tour(), scene.passing_lane_m) {
-        (Some(tour), Some(lane_m)) => Way::Along(along(scene, config, tour, lane_m, k, closeness)),
+    match (path.tour(), scene.company) {
+        (Some(tour), Company::Ahead) => Way::Along(ahead(config, tour, k, closeness)),
+        (Some(tour), Company::BothWays(_)) if k.is_multiple_of(2) => Way::Along(ahead(config, tour, k / 2, closeness)),
+        (Some(tour), Company::BothWays(lane_m)) => Way::Along(towards(scene, config, tour, lane_m, k)),
         _ => Way::Around(round(scene, config, k, closeness)),
     }
 }
 
-/// Number `k` on the camera's tour: the even ones ahead of it, the less far the closer, the odd ones towards it in the lane beside
-/// the tour.
-fn along(scene: &Scene, config: &WorldConfig, tour: &Tour, lane_m: f64, k: usize, closeness: f64) -> Companion {
+/// Number `place` of those ahead of the camera on its tour, the less far the closer.
+fn ahead(config: &WorldConfig, tour: &Tour, place: usize, closeness: f64) -> Companion {
     let mut draw = Rng::new(config.seed, 0xc0a1);
+    let [far, near] = LEAD_M.map(f64::ln);
+    let lead_m = (far + (near - far) * closeness / 2.0).exp();
+    let pace = tour.length() / tour.period();
+    // All waver alike, and so never run into each other.
+    let waver = [WAVER * lead_m / pace, WAVER_RATE, draw.range64(0.0, std::f64::consts::TAU)];
+    let start_s = (lead_m + APART_M * place as f64) / pace;
+    Companion::new(tour.clone(), Manner { start_s, rate: 1.0, beside_m: -LEFT_M, waver })
+}
+
+/// Number `k` of all, who comes towards the camera in the lane beside its tour.
+fn towards(scene: &Scene, config: &WorldConfig, tour: &Tour, lane_m: f64, k: usize) -> Companion {
     let seconds = config.frames as f64 / config.camera.fps;
-    if k.is_multiple_of(2) {
-        let [far, near] = LEAD_M.map(f64::ln);
-        let lead_m = (far + (near - far) * closeness / 2.0).exp();
-        let pace = tour.length() / tour.period();
-        // All waver alike, and so never run into each other.
-        let waver = [WAVER * lead_m / pace, WAVER_RATE, draw.range64(0.0, std::f64::consts::TAU)];
-        let start_s = (lead_m + APART_M * (k / 2) as f64) / pace;
-        return Companion::new(tour.clone(), Manner { start_s, rate: 1.0, beside_m: -LEFT_M, waver });
-    }
     // Beside a tour with narrow bends nobody could walk: this lane has wide ones.
     let lane = Tour::new(&scene.round, WALK, tour.period());
     let early = Rng::new(config.seed, 0x1a7e).range64(0.3, 0.6) * seconds.min(12.0);

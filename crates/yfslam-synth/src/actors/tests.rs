@@ -179,6 +179,7 @@ fn nobody_walks_through_anybody() {
         "walking_xyz?seed=2&people=6&share=0.5",
         "walking_xyz?seed=3&people=4&robots=2&carry=on&chair=on",
         "corridor_loop?seed=1&people=6",
+        "dark_rescue?seed=1&people=6",
     ] {
         let (mut actors, config) = actors(spec);
         let scene = Scene::new(config.scene, config.seed);

@@ -6,7 +6,7 @@ use nalgebra::Point3;
 use super::builder::{Builder, Side};
 use super::furniture::{bin, plant};
 use super::wall::Wall;
-use super::{Scene, Seat};
+use super::{Company, Scene, Seat};
 use crate::camera_path::look_at;
 use crate::light::{Lamp, Lights};
 use crate::mesh::Vec3;
@@ -70,7 +70,7 @@ pub fn build(seed: u64) -> Scene {
             [mx.into(), -f64::from(my)],
             [west, -f64::from(my)],
         ],
-        passing_lane_m: Some(0.76),
+        company: Company::BothWays(0.76),
         seats,
         stands: vec![stand(0.75, -0.6, 1.9), stand(0.7, 0.9, 2.3), stand(-0.6, 2.4, -2.9), stand(0.5, 3.0, 2.9)],
     }

@@ -5,7 +5,7 @@ use nalgebra::Point3;
 
 use super::builder::{Builder, Side};
 use super::wall::Wall;
-use super::{Scene, Seat};
+use super::{Company, Scene, Seat};
 use crate::camera_path::look_at;
 use crate::light::{Lamp, Lights};
 use crate::mesh::Vec3;
@@ -36,7 +36,7 @@ pub fn build(seed: u64) -> Scene {
         walk_far_y: 2.0,
         walk_near_y: [-0.65, -0.30],
         round: vec![[0.0, -1.3], [-1.6, -1.2], [-1.6, 1.5], [1.6, 1.5], [1.6, -1.2]],
-        passing_lane_m: None,
+        company: Company::Apart,
         seats,
         stands: vec![stand(-1.7, 1.2, -2.4), stand(1.8, 1.1, 2.4), stand(-0.4, 2.0, 3.0), stand(0.6, 1.9, -2.8)],
     }

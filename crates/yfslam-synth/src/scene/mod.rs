@@ -24,6 +24,17 @@ pub struct Seat {
     pub heading: f32,
 }
 
+/// Where people walk while the camera goes on the round of a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Company {
+    /// Around the furniture, which keeps clear of the round.
+    Apart,
+    /// On the round, ahead of the camera: it leaves no room to meet anyone.
+    Ahead,
+    /// On the round: some ahead of the camera, some towards it and past it, so far to the right of the round, m.
+    BothWays(f64),
+}
+
 /// A place.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -45,9 +56,8 @@ pub struct Scene {
     pub walk_near_y: [f64; 2],
     /// Corners of a closed round on the floor along which a camera can be carried or driven, the first on a straight, m.
     pub round: Vec<[f64; 2]>,
-    /// How far to the right of that round someone can walk past the camera on it, m; `None` where the walk around the furniture
-    /// keeps clear of the round.
-    pub passing_lane_m: Option<f64>,
+    /// Where people walk while the camera is on that round.
+    pub company: Company,
     /// Where people can sit.
     pub seats: Vec<Seat>,
     /// Where people can stand without being in the way: position on the floor and heading.

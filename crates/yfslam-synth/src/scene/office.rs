@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use super::builder::Builder;
 use super::furniture::{bin, bookshelf, chair, desk, lying_book, monitor, mug, plant};
-use super::{Scene, Seat};
+use super::{Company, Scene, Seat};
 use crate::camera_path::look_at;
 use crate::light::{Lamp, Lights};
 use crate::mesh::Vec3;
@@ -41,7 +41,7 @@ pub fn build(seed: u64) -> Scene {
         walk_half_width: 2.3,
         walk_far_y: 2.3,
         walk_near_y: [-1.1, -0.75],
-        passing_lane_m: None,
+        company: Company::Apart,
         seats,
         round: vec![[0.0, -1.2], [-2.05, -1.0], [-2.05, 2.3], [2.1, 2.3], [2.1, -1.0]],
         stands: vec![stand(-1.75, 0.6, -2.0), stand(1.8, 0.7, 2.2), stand(-0.5, 2.1, PI), stand(0.7, 2.2, -2.6)],

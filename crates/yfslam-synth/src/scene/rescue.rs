@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion};
 
 use super::builder::Builder;
 use super::wall::Wall;
-use super::{Scene, Seat};
+use super::{Company, Scene, Seat};
 use crate::camera_path::look_at;
 use crate::light::{Lamp, Lights};
 use crate::mesh::Vec3;
@@ -52,7 +52,7 @@ pub fn build(seed: u64) -> Scene {
         walk_far_y: 0.45,
         walk_near_y: [-1.25, -0.90],
         round: ROUND.to_vec(),
-        passing_lane_m: None,
+        company: Company::Ahead,
         seats: vec![crate_seat(-1.52, 0.88, -2.5), crate_seat(1.72, 0.86, 2.6)],
         stands: vec![stand(-0.6, 0.3, 2.9), stand(0.7, 0.25, -2.9), stand(-2.2, 0.0, -2.2), stand(2.5, -0.2, 2.2)],
     }

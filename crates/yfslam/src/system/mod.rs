@@ -96,6 +96,8 @@ pub struct Slam {
     movable_classes: Vec<usize>,
     movable: Vec<Detection>,
     detector_failures: usize,
+    /// Frames that were not refused.
+    frames_seen: usize,
     last_timestamp_ns: Option<i64>,
     resets: usize,
     /// Frames since the camera was lost that showed enough for a map and were not recognised.
@@ -139,6 +141,7 @@ impl Slam {
             movable_classes,
             movable: Vec::new(),
             detector_failures: 0,
+            frames_seen: 0,
             last_timestamp_ns: None,
             resets: 0,
             unknown_frames: 0,
@@ -202,10 +205,10 @@ impl Slam {
         self.check(frame)?;
         let mut times = StageTimes::default();
         let mut clock = Stopwatch::start();
-        let detecting = self.start_detector(frame);
+        let boxes_are_due = self.start_detector(frame);
         self.extract(frame);
         times.features = clock.lap();
-        self.collect_boxes(frame, detecting);
+        self.collect_boxes(frame, boxes_are_due);
         times.detector_wait = clock.lap();
         let features = &mut self.tracker.current.features;
         let evidence = Evidence {
@@ -304,29 +307,33 @@ impl Slam {
         Ok(())
     }
 
-    /// Hands the image to the detector unless the frame brings its boxes along. Returns whether boxes are to be waited for.
+    /// Hands the image to the detector if boxes are due and the frame does not bring its own. Returns whether they are.
     fn start_detector(&mut self, frame: &RgbdFrame) -> bool {
-        match &mut self.detector {
-            Some(detector) if frame.detections.is_none() => {
-                detector.start(&frame.color);
-                true
-            }
-            _ => false,
+        let due = self.frames_seen.is_multiple_of(self.config.dynamic.detect_every);
+        self.frames_seen += 1;
+        if let Some(detector) = self.detector.as_mut().filter(|_| due && frame.detections.is_none()) {
+            detector.start(&frame.color);
         }
+        due
     }
 
-    /// This frame's boxes of movable objects. A frame the detector fails on counts as one without boxes: tracks carry it.
-    fn collect_boxes(&mut self, frame: &RgbdFrame, detecting: bool) {
+    /// Boxes of movable objects for this frame. A frame the detector fails on counts as one without boxes, as does one for which none
+    /// are due: tracks carry it.
+    fn collect_boxes(&mut self, frame: &RgbdFrame, due: bool) {
         self.movable.clear();
         if let Some(known) = &frame.detections {
-            self.movable.extend_from_slice(known);
-        } else if let (true, Some(detector)) = (detecting, &mut self.detector) {
-            match detector.finish() {
-                Ok(boxes) => self.movable.extend(boxes.iter().filter(|d| self.movable_classes.contains(&d.class))),
-                Err(error) => {
-                    tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
-                    self.detector_failures += 1;
-                }
+            self.movable.extend(known.iter().filter(|_| due));
+            return;
+        }
+        let Some(detector) = &mut self.detector else { return };
+        // A map is not begun before it is known who is in it.
+        let waits = !self.config.dynamic.detect_async || self.state == TrackingState::NotInitialized;
+        match if waits { detector.finish() } else { detector.poll() } {
+            None => {}
+            Some(Ok(boxes)) => self.movable.extend(boxes.iter().filter(|d| self.movable_classes.contains(&d.class))),
+            Some(Err(error)) => {
+                tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
+                self.detector_failures += 1;
             }
         }
     }

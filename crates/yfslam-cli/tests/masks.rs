@@ -1,0 +1,86 @@
+//! `yfslam run --masks`: what can move, from a folder of images.
+#![allow(clippy::unwrap_used, reason = "a test may")]
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+
+use common::{ate_rmse, fails, record, report, succeeds};
+use yfslam::image::Image;
+use yfslam_io::write::{write_color_png, write_depth_png};
+
+/// People who walk past and lead a camera astray that does not know of them.
+const WALKING: &str = "walking_static?people=3&share=0.4&width=320&height=240&frames=60";
+
+/// Puts the same mask of 16 bits beside each of the first `count` frames of a recording.
+fn mask(folder: &Path, count: usize, size: [usize; 2]) {
+    let mut mask = Image::<u16>::new(size[0], size[1]);
+    mask.row_mut(5).fill(300);
+    for index in 0..count {
+        write_depth_png(&folder.join(format!("{index}.png")), &mask).unwrap();
+    }
+}
+
+#[test]
+fn masks_alone_keep_walkers_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    succeeds(root, &["synth", WALKING, "--out", "rec", "-q"]);
+    let args = ["run", "rec", "--masks", "rec/masks", "--method", "none,full,dyna", "--out", "out"];
+    let output = succeeds(root, &args);
+    assert!(output.stderr.contains("masks alone") && output.stderr.contains("60 of 60"), "{}", output.stderr);
+    let [none, full, dyna] = ["none", "full", "dyna"].map(|method| report(&root.join("out").join(method)));
+    assert_eq!(full["boxes"], "masks");
+    assert_eq!((&full["masks"]["found"], &full["masks"]["missing"]), (&60.into(), &0.into()));
+    assert_eq!(full["dynamic"]["boxes"], 0);
+    for report in [&full, &dyna] {
+        assert_eq!(report["frames"]["tracked"], 60);
+        assert!(
+            ate_rmse(report) < 0.01 && 4.0 * ate_rmse(report) < ate_rmse(&none),
+            "{} {}",
+            ate_rmse(report),
+            ate_rmse(&none)
+        );
+    }
+    // Backward, each frame has its own mask.
+    succeeds(root, &["run", "rec", "--masks", "rec/masks", "--reverse", "--out", "back", "-q"]);
+    assert!(ate_rmse(&report(&root.join("back"))) < 0.01);
+}
+
+#[test]
+fn missing_masks_are_counted_and_a_list_may_name_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    record(&root.join("seq"));
+    mask(&root.join("m"), 9, [320, 240]);
+    let args = ["run", "seq", "--masks", "m", "--out", "out"];
+    let output = succeeds(root, &args);
+    assert!(output.stderr.contains("9 of 12 frames have a mask"), "{}", output.stderr);
+    assert!(output.stderr.contains("3 frames have no mask") && output.stderr.contains("9.png"), "{}", output.stderr);
+    assert_eq!(report(&root.join("out"))["masks"]["missing"], 3);
+    // The list decides, once it is there.
+    let first = fs::read_to_string(root.join("seq/rgb.txt")).unwrap().lines().next().unwrap().replace("rgb/0", "7");
+    fs::write(root.join("m/masks.txt"), first + "\n").unwrap();
+    let output = succeeds(root, &args);
+    assert!(output.stderr.contains("1 of 12 frames have a mask"), "{}", output.stderr);
+    fails(root, &["run", "seq", "--masks", "m", "--method", "yf"], &["yf works on boxes alone", "--detector"]);
+}
+
+#[test]
+fn masks_that_cannot_be_used_are_named_with_what_was_wanted() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    record(&root.join("seq"));
+    mask(&root.join("small"), 12, [160, 120]);
+    fails(root, &["run", "seq", "--masks", "small"], &["0.png", "160×120", "320×240"]);
+    fs::create_dir(root.join("empty")).unwrap();
+    fails(root, &["run", "seq", "--masks", "empty"], &["none of the 12 frames", "0.png"]);
+    fails(root, &["run", "seq", "--masks", "nowhere"], &["nowhere", "no such folder"]);
+    fails(root, &["run", "synth:walking_xyz?frames=3", "--masks", "empty"], &["yfslam synth"]);
+    // One of another size among good ones costs its frame, and is told of.
+    mask(&root.join("m"), 12, [320, 240]);
+    write_color_png(&root.join("m/5.png"), &Image::new(16, 16)).unwrap();
+    let output = succeeds(root, &["run", "seq", "--masks", "m", "--out", "out"]);
+    assert!(output.stdout.contains("1 × unusable mask") && output.stdout.contains("5.png"), "{}", output.stdout);
+}
