@@ -3,6 +3,7 @@
 //! In: frames, which several lanes may share. Out: a [`Judged`] run, its files written.
 
 use anyhow::Result;
+use yfslam::dense::DenseConfig;
 use yfslam::dynamic::Method;
 use yfslam::tracking::TrackingState;
 use yfslam::{Config, RgbdFrame, Slam};
@@ -11,6 +12,7 @@ use yfslam_eval::{EvalError, EvalOptions, Evaluation, ExpectedFrames};
 
 use crate::accuracy::{judge, to_eval};
 use crate::boxes::{BoxOrigin, DetectionTally};
+use crate::dense::{self, DenseRun};
 use crate::detector::LoadedDetector;
 use crate::map::MapArgs;
 use crate::moments::Moments;
@@ -27,6 +29,7 @@ pub struct Lane {
     pub state: TrackingState,
     overlay: Option<Overlay>,
     moments: Option<Moments>,
+    dense: Option<DenseRun>,
     /// What ended it early.
     failure: Option<anyhow::Error>,
 }
@@ -38,6 +41,8 @@ pub struct Extras<'a> {
     pub overlay: bool,
     /// Evenly spread moments of which the report has a picture; `None` without a report.
     pub moments: Option<usize>,
+    /// A dense map.
+    pub dense: bool,
     pub map: &'a MapArgs,
 }
 
@@ -87,7 +92,8 @@ impl Lane {
         let (detector, times) = detector.map(|d| (d.detector, d.times)).unzip();
         let slam = extras.map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
         let pipeline = Pipeline::new(slam, times);
-        Ok(Self { config, folder, pipeline, overlay, moments, state: TrackingState::default(), failure: None })
+        let dense = extras.dense.then(|| DenseRun::new(&DenseConfig::default(), &source.camera.camera)).transpose()?;
+        Ok(Self { config, folder, pipeline, overlay, moments, dense, state: TrackingState::default(), failure: None })
     }
 
     /// Takes one frame through the pipeline.
@@ -97,6 +103,9 @@ impl Lane {
             Ok(frame) => {
                 self.state = self.pipeline.track(frame);
                 self.failure = self.picture(frame).err();
+                if let Some(dense) = &mut self.dense {
+                    dense.see(frame, &mut self.pipeline);
+                }
             }
             Err(skip) => self.pipeline.skip(skip.clone()),
         }
@@ -123,11 +132,12 @@ impl Lane {
     /// # Errors
     /// What ended it early, or why there is no trajectory; a file cannot be written.
     pub fn finish<'a>(self, judge_by: Judge<'a>, map: &MapArgs) -> Result<Judged<'a>> {
-        let Self { config, folder, mut pipeline, moments, failure, .. } = self;
+        let Self { config, folder, mut pipeline, moments, dense, failure, .. } = self;
         if let Some(failure) = failure {
             return Err(failure);
         }
         map.save(&mut pipeline)?;
+        let survey = dense.map(|dense| dense.finish(&mut pipeline));
         let mut outcome = pipeline.finish(&config)?;
         let mut shared = judge_by.reading.clone();
         let needs_boxes = config.dynamic.method != Method::None;
@@ -143,6 +153,9 @@ impl Lane {
             judge(&truth.poses, &to_eval(&outcome.trajectory), options)
         });
         folder.write(&outcome, &config)?;
+        if let Some(survey) = &survey {
+            dense::write(folder.path(), survey)?;
+        }
         let pictures = moments.map_or(Ok(Vec::new()), |moments| moments.to_pictures())?;
         let boxes = if needs_boxes { judge_by.boxes } else { &BoxOrigin::None };
         Ok(Judged { config, folder, outcome, boxes, shared, evaluation, pictures })

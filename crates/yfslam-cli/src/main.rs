@@ -10,6 +10,7 @@ mod boxes;
 mod cli;
 mod command;
 mod cpu;
+mod dense;
 mod detector;
 mod draw;
 mod found;

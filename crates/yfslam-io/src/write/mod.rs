@@ -1,5 +1,7 @@
 //! Writes files whole or not at all.
 
+mod octomap;
+mod pcd;
 mod ply;
 mod png;
 mod recording;
@@ -10,6 +12,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
+pub use octomap::{OctreeFormat, OctreeSize, OctreeVoxel, write_octomap};
+pub use pcd::write_pcd;
 pub use ply::{PlyPoint, write_ply};
 pub use png::{write_color_png, write_depth_png};
 pub use recording::{ListedStamps, RecordingWriter};

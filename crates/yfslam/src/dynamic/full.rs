@@ -97,6 +97,11 @@ impl Full {
         }
     }
 
+    /// Whether a position of the raw image, px, lies on something that moves or within `edge_px` of it.
+    pub fn moves_at(&self, raw: [f32; 2], edge_px: f32) -> bool {
+        self.bodies.covers(raw, edge_px)
+    }
+
     /// Forgets all views.
     pub fn forget_views(&mut self) {
         self.views.clear();

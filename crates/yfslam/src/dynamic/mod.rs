@@ -132,6 +132,14 @@ impl DynamicFilter {
         &self.regions
     }
 
+    /// Whether a position of the raw image, px, shows something that moves in the last frame, or lies within `edge_px` of it.
+    pub fn moves_at(&self, config: &DynamicConfig, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
+        match config.method {
+            Method::Full => self.full.moves_at(raw, edge_px),
+            _ => self.regions.iter().any(|region| region.covers(depth, raw, edge_px)),
+        }
+    }
+
     /// Forgets earlier views: the world begins anew.
     pub fn forget_views(&mut self) {
         self.full.forget_views();

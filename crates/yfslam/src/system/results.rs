@@ -4,6 +4,7 @@ use super::Slam;
 use crate::detection::Detection;
 use crate::dynamic::Region;
 use crate::geometry::Pose;
+use crate::image::DepthImage;
 use crate::loops::LoopClosed;
 use crate::map::persist::{MapError, encode};
 use crate::map::{KeyFrameId, Map};
@@ -80,6 +81,12 @@ impl Slam {
     /// The parts of the last frame that were found to move.
     pub fn moving_regions(&self) -> &[Region] {
         self.filter.regions()
+    }
+
+    /// Whether a position of the raw image, px, shows something that moves in the last frame, whose depth is given, or lies within
+    /// `edge_px` of it.
+    pub fn moves_at(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
+        self.filter.moves_at(&self.config.dynamic, depth, raw, edge_px)
     }
 
     /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.

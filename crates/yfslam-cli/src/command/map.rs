@@ -1,0 +1,183 @@
+//! `yfslam map`: what a run has seen, as maps that people use.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use nalgebra::{UnitQuaternion, Vector3};
+use yfslam::dense::cloud::{CloudPoint, cloud};
+use yfslam::dense::persist::decode;
+use yfslam::dense::{DenseConfig, Survey, Volume, up};
+use yfslam_io::write::{OctreeFormat, OctreeVoxel, PlyPoint, write_octomap, write_pcd, write_ply};
+
+use crate::dense::DENSE_FILE;
+use crate::progress::Progress;
+use crate::terminal::Terminal;
+
+const EXAMPLES: &str = "\
+Examples:
+  yfslam run rgbd_bonn_crowd --camera bonn --dense
+  yfslam map yfslam-out/rgbd_bonn_crowd                              all products
+  yfslam map yfslam-out/rgbd_bonn_crowd --octomap --grid --resolution 0.1
+  yfslam map dense.map --cloud --out clouds --up 0,-1,0
+
+In the output folder:
+  cloud.ply, cloud.pcd      with --cloud, coloured points, one a voxel
+  octomap.bt, octomap.ot    with --octomap, for OctoMap: free or occupied; log-odds
+
+The z-axis points up, x to the front of the first picture, y to its left (ROS, REP 103).";
+
+/// Make clouds, octrees, grids and meshes of what a run with --dense has seen, without people.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct DenseMapArgs {
+    /// The output folder of a run with --dense, or its `dense.map`.
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+    /// Coloured point cloud.
+    #[arg(long, help_heading = "Products")]
+    cloud: bool,
+    /// Occupancy octree for OctoMap.
+    #[arg(long, help_heading = "Products")]
+    octomap: bool,
+    /// Side of a voxel, m, from 0.01 to 0.2.
+    #[arg(long, value_name = "M", default_value_t = 0.05, help_heading = "Map")]
+    resolution: f32,
+    /// Depth beyond which readings make no surface, m.
+    #[arg(long, value_name = "M", default_value_t = 5.0, help_heading = "Map")]
+    max_range: f32,
+    /// Which way is up: `level` (as floors, tables and ceilings say), `camera` (upright in the first picture), or a direction X,Y,Z of
+    /// the run's world.
+    #[arg(long, value_name = "UP", default_value = "level", allow_hyphen_values = true, help_heading = "Map")]
+    up: Up,
+    /// Where the files go [default: `map` beside `dense.map`].
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    out: Option<PathBuf>,
+}
+
+/// How up is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Up {
+    Level,
+    Camera,
+    Direction([f64; 3]),
+}
+
+impl std::str::FromStr for Up {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "level" => return Ok(Self::Level),
+            "camera" => return Ok(Self::Camera),
+            _ => {}
+        }
+        let numbers: Vec<f64> = text.split(',').filter_map(|number| number.trim().parse().ok()).collect();
+        match <[f64; 3]>::try_from(numbers) {
+            Ok(up) if Vector3::from(up).norm() > 1e-6 && up.iter().all(|v| v.is_finite()) => Ok(Self::Direction(up)),
+            _ => Err(format!("'{text}' is no direction; write level, camera, or X,Y,Z such as 0,-1,0")),
+        }
+    }
+}
+
+/// A volume in the making of products.
+struct Maker<'a> {
+    survey: &'a Survey,
+    volume: Volume,
+    folder: PathBuf,
+    terminal: Terminal,
+}
+
+pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
+    let config = DenseConfig { resolution_m: args.resolution, max_range_m: args.max_range, ..Default::default() };
+    config.validate()?;
+    let (survey, folder) = args.open()?;
+    terminal.note(&format!("{} pieces; {}", survey.pieces.len(), memory_bound(&config, &survey)));
+    let started = Instant::now();
+    let turn = args.turn(&survey);
+    let volume = with_progress(terminal, "occupancy", &survey, |told| survey.volume(&config, &turn, told));
+    let each_ms = started.elapsed().as_secs_f64() * 1e3 / survey.pieces.len() as f64;
+    let mut text = describe(&volume, each_ms);
+    let maker = Maker { survey: &survey, volume, folder, terminal };
+    let all = !(args.cloud || args.octomap);
+    if args.cloud || all {
+        text += &maker.cloud()?;
+    }
+    if args.octomap || all {
+        text += &maker.octomap()?;
+    }
+    terminal.result(&format!("{text}\nwritten to {}\n", maker.folder.display()))
+}
+
+impl DenseMapArgs {
+    /// The survey, and the folder for its products.
+    fn open(&self) -> Result<(Survey, PathBuf)> {
+        let file = if self.run.is_dir() { self.run.join(DENSE_FILE) } else { self.run.clone() };
+        let bytes = std::fs::read(&file).with_context(|| {
+            format!("cannot read {}; make it with `yfslam run SEQUENCE --dense`, or check the path", file.display())
+        })?;
+        let survey = decode(&bytes).with_context(|| format!("{} cannot be used", file.display()))?;
+        ensure!(!survey.pieces.is_empty(), "{} holds no keyframe: the run tracked nothing", file.display());
+        let beside = || file.parent().unwrap_or(Path::new(".")).join("map");
+        Ok((survey, self.out.clone().unwrap_or_else(beside)))
+    }
+
+    fn turn(&self, survey: &Survey) -> UnitQuaternion<f64> {
+        match self.up {
+            Up::Level => up::of_survey(survey),
+            Up::Camera => up::of_camera(),
+            Up::Direction(up) => up::from_up(&Vector3::from(up)),
+        }
+    }
+}
+
+impl Maker<'_> {
+    fn cloud(&self) -> Result<String> {
+        let told = |told: &mut dyn FnMut(usize)| cloud(self.survey, &self.volume, told);
+        let points = with_progress(self.terminal, "cloud", self.survey, told);
+        let ply = |p: &CloudPoint| PlyPoint { position_m: p.position_m, color: p.color };
+        write_ply(&self.folder.join("cloud.ply"), points.iter().map(ply))?;
+        write_pcd(&self.folder.join("cloud.pcd"), points.iter().map(ply))?;
+        Ok(format!("cloud: {} points\n", points.len()))
+    }
+
+    fn octomap(&self) -> Result<String> {
+        let resolution = f64::from(self.volume.config().resolution_m);
+        // As the user wrote it, not as a float of 32 bits has it.
+        let resolution = (resolution * 1e6).round() / 1e6;
+        let voxels = || self.volume.voxels().map(|v| OctreeVoxel { voxel: v.voxel, log_odds: v.log_odds });
+        let binary = write_octomap(&self.folder.join("octomap.bt"), resolution, voxels(), OctreeFormat::Binary)?;
+        let full = write_octomap(&self.folder.join("octomap.ot"), resolution, voxels(), OctreeFormat::LogOdds)?;
+        Ok(format!("octomap: {} nodes in octomap.bt, {} in octomap.ot\n", binary.nodes, full.nodes))
+    }
+}
+
+/// Shows how far `work` is, which says how many pieces are done.
+fn with_progress<T>(
+    terminal: Terminal,
+    label: &str,
+    survey: &Survey,
+    work: impl FnOnce(&mut dyn FnMut(usize)) -> T,
+) -> T {
+    let mut progress = Progress::new(terminal, label, survey.pieces.len());
+    let result = work(&mut |done| progress.at(done, "pieces", String::new));
+    progress.finish();
+    result
+}
+
+fn describe(volume: &Volume, each_ms: f64) -> String {
+    let occupied = volume.voxels().filter(|v| v.occupied).count();
+    let free = volume.voxels().count() - occupied;
+    format!(
+        "occupancy: {occupied} voxels of {} m occupied, {free} free; {each_ms:.1} ms a keyframe, {:.0} MB\n",
+        volume.config().resolution_m,
+        volume.bytes() as f64 / 1e6
+    )
+}
+
+/// How much memory the map can take at most: by extent, resolution and number of pieces.
+fn memory_bound(config: &DenseConfig, survey: &Survey) -> String {
+    let bound = Volume::bytes_at_most(config, survey);
+    format!("at {} m the map takes {:.0} MB at most", config.resolution_m, bound as f64 / 1e6)
+}

@@ -1,0 +1,69 @@
+//! The dense map of a run: a piece for each keyframe, which follows every correction, and the file that keeps them.
+//!
+//! In: frames and the system that has just seen them. Out: `dense.map`, from which `yfslam map` makes what people use.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Result;
+use yfslam::dense::persist::encode;
+use yfslam::dense::{DenseConfig, DenseMapper, Survey};
+use yfslam::{Camera, RgbdFrame};
+use yfslam_io::write_atomically;
+
+use crate::pipeline::Pipeline;
+
+/// Name of the file in the output folder.
+pub const DENSE_FILE: &str = "dense.map";
+
+/// The dense map in the making.
+pub struct DenseRun {
+    mapper: DenseMapper,
+    resets: usize,
+}
+
+impl DenseRun {
+    /// An empty dense map.
+    ///
+    /// # Errors
+    /// For a value of the configuration that cannot work.
+    pub fn new(config: &DenseConfig, camera: &Camera) -> Result<Self> {
+        Ok(Self { mapper: DenseMapper::new(config, camera)?, resets: 0 })
+    }
+
+    /// Takes note of the frame that the pipeline saw last: if it became a keyframe, its piece is cut, and all pieces follow the map.
+    pub fn see(&mut self, frame: &RgbdFrame, pipeline: &mut Pipeline) {
+        let slam = pipeline.slam();
+        if slam.resets() > self.resets {
+            self.resets = slam.resets();
+            self.mapper.clear();
+        }
+        if !pipeline.made_keyframe() {
+            return;
+        }
+        let Some(tie) = slam.last_frame().reference else { return };
+        let started = Instant::now();
+        let piece = self.mapper.cut(&frame.color, &frame.depth, |at, edge| slam.moves_at(&frame.depth, at, edge));
+        self.mapper.hang(frame.timestamp_ns, tie, piece);
+        let cut = started.elapsed();
+        self.mapper.follow(slam.map());
+        let followed = started.elapsed() - cut;
+        pipeline.stages.push("dense piece", cut);
+        pipeline.stages.push("dense map", followed);
+    }
+
+    /// The pieces, where the map has them at the end.
+    pub fn finish(self, pipeline: &mut Pipeline) -> Survey {
+        pipeline.settle();
+        self.mapper.into_survey(pipeline.slam().map())
+    }
+}
+
+/// Writes the pieces into the output folder.
+///
+/// # Errors
+/// The file cannot be written; what stood there stays.
+pub fn write(folder: &Path, survey: &Survey) -> Result<()> {
+    let bytes = encode(survey)?;
+    Ok(write_atomically(&folder.join(DENSE_FILE), |file| file.write_all(&bytes))?)
+}
