@@ -11,6 +11,7 @@ mod cli;
 mod command;
 mod cpu;
 mod dense;
+mod dense_picture;
 mod detector;
 mod draw;
 mod found;

@@ -9,9 +9,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 use yfslam::dense::cloud::{CloudPoint, cloud};
 use yfslam::dense::persist::decode;
 use yfslam::dense::{DenseConfig, Survey, Volume, up};
-use yfslam_io::write::{OctreeFormat, OctreeVoxel, PlyPoint, write_octomap, write_pcd, write_ply};
+use yfslam_io::write::{OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_octomap, write_pcd, write_ply};
 
 use crate::dense::DENSE_FILE;
+use crate::dense_picture::{from_above, from_corner};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 
@@ -24,9 +25,15 @@ Examples:
 
 In the output folder:
   cloud.ply, cloud.pcd      with --cloud, coloured points, one a voxel
+  above.png, corner.png     with --cloud, pictures of it
   octomap.bt, octomap.ot    with --octomap, for OctoMap: free or occupied; log-odds
 
 The z-axis points up, x to the front of the first picture, y to its left (ROS, REP 103).";
+
+/// Height above the floor from which pictures leave out what is there, m.
+const SHOWN_M: f32 = 1.9;
+/// Width and height of pictures, px.
+const PICTURE_PX: [usize; 2] = [900, 600];
 
 /// Make clouds, octrees, grids and meshes of what a run with --dense has seen, without people.
 #[derive(Args, Debug)]
@@ -42,10 +49,10 @@ pub struct DenseMapArgs {
     #[arg(long, help_heading = "Products")]
     octomap: bool,
     /// Side of a voxel, m, from 0.01 to 0.2.
-    #[arg(long, value_name = "M", default_value_t = 0.05, help_heading = "Map")]
+    #[arg(long, value_name = "M", default_value_t = DenseConfig::default().resolution_m, help_heading = "Map")]
     resolution: f32,
     /// Depth beyond which readings make no surface, m.
-    #[arg(long, value_name = "M", default_value_t = 5.0, help_heading = "Map")]
+    #[arg(long, value_name = "M", default_value_t = DenseConfig::default().max_range_m, help_heading = "Map")]
     max_range: f32,
     /// Which way is up: `level` (as floors, tables and ceilings say), `camera` (upright in the first picture), or a direction X,Y,Z of
     /// the run's world.
@@ -85,6 +92,8 @@ impl std::str::FromStr for Up {
 struct Maker<'a> {
     survey: &'a Survey,
     volume: Volume,
+    /// Height of the floor.
+    floor_m: f32,
     folder: PathBuf,
     terminal: Terminal,
 }
@@ -99,7 +108,8 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     let volume = with_progress(terminal, "occupancy", &survey, |told| survey.volume(&config, &turn, told));
     let each_ms = started.elapsed().as_secs_f64() * 1e3 / survey.pieces.len() as f64;
     let mut text = describe(&volume, each_ms);
-    let maker = Maker { survey: &survey, volume, folder, terminal };
+    let floor_m = up::floor_m(&survey, &turn).unwrap_or_default() as f32;
+    let maker = Maker { survey: &survey, volume, floor_m, folder, terminal };
     let all = !(args.cloud || args.octomap);
     if args.cloud || all {
         text += &maker.cloud()?;
@@ -139,6 +149,12 @@ impl Maker<'_> {
         let ply = |p: &CloudPoint| PlyPoint { position_m: p.position_m, color: p.color };
         write_ply(&self.folder.join("cloud.ply"), points.iter().map(ply))?;
         write_pcd(&self.folder.join("cloud.pcd"), points.iter().map(ply))?;
+        let resolution_m = self.volume.config().resolution_m;
+        let cut_m = self.floor_m + SHOWN_M;
+        let above = from_above(&points, resolution_m, cut_m, PICTURE_PX[0]);
+        write_color_png(&self.folder.join("above.png"), &above)?;
+        let corner = from_corner(&points, resolution_m, cut_m, PICTURE_PX);
+        write_color_png(&self.folder.join("corner.png"), &corner)?;
         Ok(format!("cloud: {} points\n", points.len()))
     }
 

@@ -9,8 +9,9 @@ config_section! {
     DenseConfig {
         /// Side of a voxel, m, from 0.01 to 0.2. Source: DS-SLAM.
         resolution_m: f32 = 0.05,
-        /// Depth beyond which the sensor's readings make no surface, m; up to there space is free before them. Source: DS-SLAM.
-        max_range_m: f32 = 5.0,
+        /// Depth beyond which the sensor's readings make no surface, m; up to there space is free before them. DS-SLAM has
+        /// 5; beyond 4 a structured-light camera's steps are as large as a voxel (Khoshelham and Elberink, Sensors 2012).
+        max_range_m: f32 = 4.0,
         /// Pixels along each side of a cell of a piece. At 2 a keyframe takes 0.4 MB of memory.
         stride_px: usize = 2,
         /// Distance from what moves within which depth is not believed, px: edges of structured-light depth are off by some.
@@ -19,6 +20,11 @@ config_section! {
         edge_step_m: f32 = 0.03,
         /// and this share of the depth.
         edge_step_share: f32 = 0.05,
+        /// Half the side of the window over which depth is averaged, px for each metre of depth: noise grows with distance.
+        smooth_px_per_m: f32 = 1.5,
+        /// Difference of depth, as a share of its square, 1/m, up to which it is noise and is averaged: three times that of a Kinect
+        /// (Nguyen et al., 3DIMPVT 2012).
+        smooth_noise_per_m: f32 = 0.006,
         /// Probability that a voxel in which a reading ends is occupied. Source: OctoMap (Hornung et al., Autonomous Robots 2013).
         hit: f32 = 0.7,
         /// The same for one that a reading passes. Source: OctoMap.

@@ -9,6 +9,7 @@
 //! Nothing that moves makes a surface: the dynamic filter's decision is cut into the piece. What it missed is taken back by the views
 //! that come after and see through it.
 
+pub mod background;
 pub mod cloud;
 mod config;
 mod mapper;

@@ -102,13 +102,14 @@ impl Piece {
         depth: &DepthImage,
         moves: impl Fn([f32; 2], f32) -> bool,
     ) -> Self {
-        let metres = cell_depths(config, grid, depth);
+        let rough = cell_depths(config, grid, depth);
+        let metres = smoothed(config, grid, &rough);
         let half = 0.5 * (grid.stride_px - 1) as f32;
         let at = |cell: usize| (cell * grid.stride_px) as f32 + half;
         let mut cells = Vec::with_capacity(metres.len());
         for (i, &z) in metres.iter().enumerate() {
             let (column, row) = (i % grid.columns, i / grid.columns);
-            let kept = z > 0.0 && !is_edge(config, grid, &metres, column, row);
+            let kept = z > 0.0 && !is_edge(config, grid, &rough, column, row);
             // Colour of what moves has to be known as such even where it has no depth.
             let mark = if moves([at(column), at(row)], config.edge_px) { MOVING } else { 0 };
             cells.push(if kept { ((z / UNIT_M + 0.5) as u16).min(MOVING - 1) | mark } else { mark });
@@ -181,6 +182,36 @@ fn cell_depths(config: &DenseConfig, grid: &CellGrid, depth: &DepthImage) -> Vec
     metres
 }
 
+/// Depth averaged along rows, then along columns, over what differs by no more than noise (a bilateral filter in two passes, as
+/// KinectFusion has one, ISMAR 2011, section 3.1).
+fn smoothed(config: &DenseConfig, grid: &CellGrid, metres: &[f32]) -> Vec<f32> {
+    let along = |from: &[f32], step: usize, place: &dyn Fn(usize) -> (usize, usize)| -> Vec<f32> {
+        let mean = |(i, &z): (usize, &f32)| {
+            let (at, length) = place(i);
+            let half = (config.smooth_px_per_m * z / grid.stride_px as f32 + 0.5) as usize;
+            // As many on either side, so that slopes stay where they are.
+            let half = half.min(at).min(length - 1 - at);
+            if z == 0.0 || half == 0 {
+                return z;
+            }
+            let noise = config.smooth_noise_per_m * z * z;
+            let (mut sum, mut count) = (z, 1.0);
+            for k in 1..=half {
+                let (before, after) = (from[i - k * step], from[i + k * step]);
+                if before == 0.0 || after == 0.0 || (before + after - 2.0 * z).abs() > 2.0 * noise {
+                    break;
+                }
+                sum += before + after;
+                count += 2.0;
+            }
+            sum / count
+        };
+        from.iter().enumerate().map(mean).collect()
+    };
+    let rows = along(metres, 1, &|i| (i % grid.columns, grid.columns));
+    along(&rows, grid.columns, &|i| (i / grid.columns, grid.rows))
+}
+
 /// Whether the depth around a cell jumps: sensors smear such edges over both sides.
 fn is_edge(config: &DenseConfig, grid: &CellGrid, metres: &[f32], column: usize, row: usize) -> bool {
     let z = metres[row * grid.columns + column];
@@ -228,11 +259,12 @@ mod tests {
         let color = RgbImage::new(camera.width, camera.height);
         let piece = Piece::cut(&config, &grid, &color, &depth, |[x, _], _| x < 20.0);
         let row = 30 * grid.columns();
-        assert_eq!(piece.reading(row + 5), Some(Reading { depth_m: 1.0, moves: true }));
+        let near = |z: Option<f32>, wanted: f32| assert!(z.is_some_and(|z| (z - wanted).abs() < 1e-4), "{z:?}");
+        assert!(piece.reading(row + 5).is_some_and(|reading| reading.moves));
         assert_eq!(piece.surface_m(row + 5), None);
-        assert_eq!(piece.surface_m(row + 30), Some(1.0));
+        near(piece.surface_m(row + 30), 1.0);
         assert_eq!((piece.reading(row + 39), piece.reading(row + 40)), (None, None), "the edge");
-        assert_eq!(piece.surface_m(row + 60), Some(3.0));
+        near(piece.surface_m(row + 60), 3.0);
     }
 
     #[test]
