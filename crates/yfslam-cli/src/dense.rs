@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::Result;
 use yfslam::dense::persist::encode;
 use yfslam::dense::{DenseConfig, DenseMapper, Survey};
-use yfslam::{Camera, RgbdFrame};
+use yfslam::{Camera, Execution, RgbdFrame};
 use yfslam_io::write_atomically;
 
 use crate::pipeline::Pipeline;
@@ -26,9 +26,9 @@ impl DenseRun {
     /// An empty dense map.
     ///
     /// # Errors
-    /// For a value of the configuration that cannot work.
-    pub fn new(config: &DenseConfig, camera: &Camera) -> Result<Self> {
-        Ok(Self { mapper: DenseMapper::new(config, camera)?, resets: 0 })
+    /// For a value of the configuration that cannot work, or if a thread cannot be started.
+    pub fn new(config: &DenseConfig, camera: &Camera, execution: Execution) -> Result<Self> {
+        Ok(Self { mapper: DenseMapper::new(config, camera, execution)?, resets: 0 })
     }
 
     /// Takes note of the frame that the pipeline saw last: if it became a keyframe, its piece is cut, and all pieces follow the map.
@@ -44,9 +44,8 @@ impl DenseRun {
         let Some(tie) = slam.last_frame().reference else { return };
         let started = Instant::now();
         let piece = self.mapper.cut(&frame.color, &frame.depth, |at, edge| slam.moves_at(&frame.depth, at, edge));
-        self.mapper.hang(frame.timestamp_ns, tie, piece);
         let cut = started.elapsed();
-        self.mapper.follow(slam.map());
+        self.mapper.hang(frame.timestamp_ns, tie, piece, slam.map());
         let followed = started.elapsed() - cut;
         pipeline.stages.push("dense piece", cut);
         pipeline.stages.push("dense map", followed);

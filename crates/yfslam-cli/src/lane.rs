@@ -92,7 +92,10 @@ impl Lane {
         let (detector, times) = detector.map(|d| (d.detector, d.times)).unzip();
         let slam = extras.map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
         let pipeline = Pipeline::new(slam, times);
-        let dense = extras.dense.then(|| DenseRun::new(&DenseConfig::default(), &source.camera.camera)).transpose()?;
+        let dense = extras
+            .dense
+            .then(|| DenseRun::new(&DenseConfig::default(), &source.camera.camera, extras.map.execution()))
+            .transpose()?;
         Ok(Self { config, folder, pipeline, overlay, moments, dense, state: TrackingState::default(), failure: None })
     }
 

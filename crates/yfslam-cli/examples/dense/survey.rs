@@ -6,7 +6,7 @@ use anyhow::Result;
 use rayon::prelude::*;
 use yfslam::dense::{DenseConfig, DenseMapper, Survey};
 use yfslam::dynamic::Method;
-use yfslam::{Config, RgbdFrame, Slam};
+use yfslam::{Config, Execution, RgbdFrame, Slam};
 use yfslam_synth::{CLASS_NAMES, World};
 
 /// Frames that are rendered at once.
@@ -26,7 +26,7 @@ pub fn take(world: &World, method: Method, dense: &DenseConfig) -> Result<Taken>
     let mut config = Config::default();
     config.dynamic.method = method;
     let mut slam = Slam::new(config.clone(), &world.config().camera, None)?;
-    let mut mapper = DenseMapper::new(dense, &world.config().camera)?;
+    let mut mapper = DenseMapper::new(dense, &world.config().camera, Execution::Inline)?;
     let (mut seconds, mut keyframes, mut resets) = (0.0, 0usize, 0);
     let movable = |class: usize| config.dynamic.movable.iter().any(|name| name == CLASS_NAMES[class]);
     for start in (0..world.len()).step_by(BATCH) {
@@ -45,13 +45,11 @@ pub fn take(world: &World, method: Method, dense: &DenseConfig) -> Result<Taken>
             let Some(tie) = slam.last_frame().reference.filter(|_| tracked.is_keyframe) else { continue };
             let started = Instant::now();
             let piece = mapper.cut(&frame.color, &frame.depth, |at, edge| slam.moves_at(&frame.depth, at, edge));
-            mapper.hang(frame.timestamp_ns, tie, piece);
-            mapper.follow(slam.map());
+            mapper.hang(frame.timestamp_ns, tie, piece, slam.map());
             seconds += started.elapsed().as_secs_f64();
             keyframes += 1;
         }
     }
-    mapper.volume();
-    let bytes = mapper.bytes();
+    let bytes = mapper.bytes() + mapper.volume(slam.map()).bytes();
     Ok(Taken { survey: mapper.into_survey(slam.map()), each_ms: seconds * 1e3 / keyframes.max(1) as f64, bytes })
 }

@@ -6,10 +6,17 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use nalgebra::{UnitQuaternion, Vector3};
+use yfslam::dense::background::{Background, background};
 use yfslam::dense::cloud::{CloudPoint, cloud};
+use yfslam::dense::grid::{GridCell, ground_grid};
+use yfslam::dense::mesh::mesh;
 use yfslam::dense::persist::decode;
 use yfslam::dense::{DenseConfig, Survey, Volume, up};
-use yfslam_io::write::{OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_octomap, write_pcd, write_ply};
+use yfslam::image::{Image, RgbImage};
+use yfslam_io::write::{
+    OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png, write_nav2, write_octomap,
+    write_pcd, write_ply, write_ply_mesh,
+};
 
 use crate::dense::DENSE_FILE;
 use crate::dense_picture::{from_above, from_corner};
@@ -27,11 +34,19 @@ In the output folder:
   cloud.ply, cloud.pcd      with --cloud, coloured points, one a voxel
   above.png, corner.png     with --cloud, pictures of it
   octomap.bt, octomap.ot    with --octomap, for OctoMap: free or occupied; log-odds
+  grid.pgm, grid.yaml       with --grid, for ROS's navigation
+  mesh.ply                  with --mesh, coloured triangles
+  background/               with --background, the keyframes with most people, as seen and without them, with depth (1/5000 m) and
+                            a mask of what is known
 
 The z-axis points up, x to the front of the first picture, y to its left (ROS, REP 103).";
 
 /// Height above the floor from which pictures leave out what is there, m.
 const SHOWN_M: f32 = 1.9;
+/// Views that are painted without people.
+const BACKGROUNDS: usize = 6;
+/// Units of their depth, as in TUM recordings, 1/m.
+const BACKGROUND_UNITS_PER_M: f32 = 5000.0;
 /// Width and height of pictures, px.
 const PICTURE_PX: [usize; 2] = [900, 600];
 
@@ -48,6 +63,15 @@ pub struct DenseMapArgs {
     /// Occupancy octree for OctoMap.
     #[arg(long, help_heading = "Products")]
     octomap: bool,
+    /// Grid to drive in, for ROS's navigation.
+    #[arg(long, help_heading = "Products")]
+    grid: bool,
+    /// Mesh of the surfaces.
+    #[arg(long, help_heading = "Products")]
+    mesh: bool,
+    /// What some keyframes saw, with the people painted over by what is behind them.
+    #[arg(long, help_heading = "Products")]
+    background: bool,
     /// Side of a voxel, m, from 0.01 to 0.2.
     #[arg(long, value_name = "M", default_value_t = DenseConfig::default().resolution_m, help_heading = "Map")]
     resolution: f32,
@@ -58,9 +82,31 @@ pub struct DenseMapArgs {
     /// the run's world.
     #[arg(long, value_name = "UP", default_value = "level", allow_hyphen_values = true, help_heading = "Map")]
     up: Up,
+    /// Heights above the floor between which the grid has obstacles, m.
+    #[arg(long, value_name = "LOW,HIGH", default_value = "0.1,1.8", help_heading = "Map")]
+    band: Band,
+    /// Height of the floor along the up direction, m, the first camera's being 0 [default: as the map shows it].
+    #[arg(long, value_name = "M", allow_negative_numbers = true, help_heading = "Map")]
+    floor: Option<f32>,
     /// Where the files go [default: `map` beside `dense.map`].
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: Option<PathBuf>,
+}
+
+/// Two heights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Band([f32; 2]);
+
+impl std::str::FromStr for Band {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Vec<f32> = text.split(',').filter_map(|number| number.trim().parse().ok()).collect();
+        match numbers[..] {
+            [low, high] if low < high && low.is_finite() && high.is_finite() => Ok(Self([low, high])),
+            _ => Err(format!("'{text}' is no band of heights; write LOW,HIGH such as 0.1,1.8")),
+        }
+    }
 }
 
 /// How up is chosen.
@@ -108,14 +154,24 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     let volume = with_progress(terminal, "occupancy", &survey, |told| survey.volume(&config, &turn, told));
     let each_ms = started.elapsed().as_secs_f64() * 1e3 / survey.pieces.len() as f64;
     let mut text = describe(&volume, each_ms);
-    let floor_m = up::floor_m(&survey, &turn).unwrap_or_default() as f32;
+    let floor_m = args.floor.or(up::floor_m(&survey, &turn).map(|floor| floor as f32)).unwrap_or_default();
     let maker = Maker { survey: &survey, volume, floor_m, folder, terminal };
-    let all = !(args.cloud || args.octomap);
+    text += &format!("floor: {:.2} m below the first camera\n", first_height_m(&survey, &turn) - floor_m);
+    let all = !(args.cloud || args.octomap || args.grid || args.mesh || args.background);
     if args.cloud || all {
         text += &maker.cloud()?;
     }
     if args.octomap || all {
         text += &maker.octomap()?;
+    }
+    if args.grid || all {
+        text += &maker.grid(args.band)?;
+    }
+    if args.mesh || all {
+        text += &maker.mesh()?;
+    }
+    if args.background || all {
+        text += &maker.background()?;
     }
     terminal.result(&format!("{text}\nwritten to {}\n", maker.folder.display()))
 }
@@ -167,6 +223,68 @@ impl Maker<'_> {
         let full = write_octomap(&self.folder.join("octomap.ot"), resolution, voxels(), OctreeFormat::LogOdds)?;
         Ok(format!("octomap: {} nodes in octomap.bt, {} in octomap.ot\n", binary.nodes, full.nodes))
     }
+
+    fn grid(&self, Band(band): Band) -> Result<String> {
+        let grid = ground_grid(&self.volume, band.map(|height| self.floor_m + height));
+        write_nav2(&self.folder.join("grid.pgm"), &grid)?;
+        let count = |what| grid.cells.iter().filter(|cell| **cell == what).count();
+        let (occupied, free) = (count(GridCell::Occupied), count(GridCell::Free));
+        Ok(format!("grid: {} × {} cells, {occupied} occupied, {free} free\n", grid.width, grid.height))
+    }
+
+    fn mesh(&self) -> Result<String> {
+        let mut progress: Option<Progress> = None;
+        let mesh = mesh(self.survey, &self.volume, |done, blocks| {
+            let progress = progress.get_or_insert_with(|| Progress::new(self.terminal, "mesh", blocks));
+            progress.at(done, "blocks", String::new);
+        });
+        progress.into_iter().for_each(Progress::finish);
+        let vertices = mesh.vertices_m.iter().zip(&mesh.colors);
+        let vertices = vertices.map(|(&position_m, &color)| PlyPoint { position_m, color });
+        write_ply_mesh(&self.folder.join("mesh.ply"), vertices, &mesh.triangles)?;
+        Ok(format!("mesh: {} vertices, {} triangles\n", mesh.vertices_m.len(), mesh.triangles.len()))
+    }
+
+    /// Views of some keyframes without people, those in which most moves.
+    fn background(&self) -> Result<String> {
+        let Survey { grid, pieces } = self.survey;
+        let cells = grid.rays().len();
+        let moving = |number: usize| (0..cells).filter(|cell| pieces[number].piece.moves(*cell)).count();
+        let mut fullest: Vec<(usize, usize)> = (0..pieces.len()).map(|number| (moving(number), number)).collect();
+        fullest.sort_by_key(|(moving, number)| (std::cmp::Reverse(*moving), *number));
+        fullest.truncate(BACKGROUNDS);
+        let (mut filled, mut hidden) = (0, 0);
+        for &(moving, number) in &fullest {
+            let one = &pieces[number];
+            let (own, pose) = (Some(&one.piece), &one.t_world_cam);
+            let view = background(self.survey, &self.volume, grid, pose, own, Some(number));
+            let colors = (0..cells).map(|cell| one.piece.color(cell)).collect();
+            let seen = RgbImage::from_vec(grid.columns(), grid.rows(), colors).unwrap_or_default();
+            write_view(&self.folder.join("background"), &format!("{number:06}"), &seen, &view)?;
+            hidden += moving;
+            filled += view.valid.data().iter().filter(|valid| **valid).count() + moving - cells;
+        }
+        let share = 100.0 * filled as f64 / hidden.max(1) as f64;
+        Ok(format!("background: {} views, {share:.1} % of what people hide is known\n", fullest.len()))
+    }
+}
+
+/// Colour and depth, and which pixels are known, as pictures.
+fn write_view(folder: &Path, name: &str, seen: &RgbImage, view: &Background) -> Result<()> {
+    write_color_png(&folder.join(format!("{name}-seen.png")), seen)?;
+    write_color_png(&folder.join(format!("{name}.png")), &view.color)?;
+    let units = |z: &f32| (z * BACKGROUND_UNITS_PER_M).min(f32::from(u16::MAX)) as u16;
+    let (width, height) = (view.color.width(), view.color.height());
+    let picture = Image::from_vec(width, height, view.depth_m.data().iter().map(units).collect()).unwrap_or_default();
+    write_depth_png(&folder.join(format!("{name}-depth.png")), &picture)?;
+    let mask = view.valid.data().iter().map(|valid| if *valid { 255 } else { 0 }).collect();
+    let mask = Image::from_vec(width, height, mask).unwrap_or_default();
+    Ok(write_mask_png(&folder.join(format!("{name}-valid.png")), &mask)?)
+}
+
+/// Height of the first camera, m.
+fn first_height_m(survey: &Survey, turn: &UnitQuaternion<f64>) -> f32 {
+    survey.pieces.first().map_or(0.0, |one| (turn * one.t_world_cam).translation.z) as f32
 }
 
 /// Shows how far `work` is, which says how many pieces are done.

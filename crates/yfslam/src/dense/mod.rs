@@ -12,7 +12,9 @@
 pub mod background;
 pub mod cloud;
 mod config;
+pub mod grid;
 mod mapper;
+pub mod mesh;
 pub mod persist;
 pub mod piece;
 #[cfg(test)]
@@ -29,7 +31,19 @@ pub use volume::{KnownVoxel, Volume};
 
 use nalgebra::UnitQuaternion;
 
+use crate::config::ConfigError;
 use crate::geometry::Pose;
+
+/// Why no dense map can be made.
+#[derive(Debug, thiserror::Error)]
+pub enum DenseError {
+    /// A value of the configuration with which nothing can work.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A thread could not be started.
+    #[error("the thread of the dense map could not be started: {0}; raise the limit of threads of this user")]
+    Thread(#[from] std::io::Error),
+}
 
 /// Pieces in their places: what all products are made of.
 #[derive(Clone, Debug)]
