@@ -43,7 +43,8 @@ impl DenseRun {
         }
         let Some(tie) = slam.last_frame().reference else { return };
         let started = Instant::now();
-        let piece = self.mapper.cut(&frame.color, &frame.depth, |at, edge| slam.moves_at(&frame.depth, at, edge));
+        let moving = slam.moving_mask(&frame.depth);
+        let piece = self.mapper.cut(&frame.color, &frame.depth, |at, edge| moving.covers(&frame.depth, at, edge));
         let cut = started.elapsed();
         self.mapper.hang(frame.timestamp_ns, tie, piece, slam.map());
         let followed = started.elapsed() - cut;

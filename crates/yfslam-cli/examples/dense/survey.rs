@@ -44,7 +44,8 @@ pub fn take(world: &World, method: Method, dense: &DenseConfig) -> Result<Taken>
             }
             let Some(tie) = slam.last_frame().reference.filter(|_| tracked.is_keyframe) else { continue };
             let started = Instant::now();
-            let piece = mapper.cut(&frame.color, &frame.depth, |at, edge| slam.moves_at(&frame.depth, at, edge));
+            let moving = slam.moving_mask(&frame.depth);
+            let piece = mapper.cut(&frame.color, &frame.depth, |at, edge| moving.covers(&frame.depth, at, edge));
             mapper.hang(frame.timestamp_ns, tie, piece, slam.map());
             seconds += started.elapsed().as_secs_f64();
             keyframes += 1;

@@ -18,6 +18,7 @@ use yfslam_io::write::{
     write_pcd, write_ply, write_ply_mesh,
 };
 
+use crate::cpu;
 use crate::dense::DENSE_FILE;
 use crate::dense_picture::{from_above, from_corner};
 use crate::progress::Progress;
@@ -149,11 +150,12 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     config.validate()?;
     let (survey, folder) = args.open()?;
     terminal.note(&format!("{} pieces; {}", survey.pieces.len(), memory_bound(&config, &survey)));
-    let started = Instant::now();
     let turn = args.turn(&survey);
-    let volume = with_progress(terminal, "occupancy", &survey, |told| survey.volume(&config, &turn, told));
-    let each_ms = started.elapsed().as_secs_f64() * 1e3 / survey.pieces.len() as f64;
-    let mut text = describe(&volume, each_ms);
+    let started = Instant::now();
+    let (volume, cpu) =
+        cpu::timed(|| with_progress(terminal, "occupancy", &survey, |told| survey.volume(&config, &turn, told)));
+    let took = cpu.unwrap_or_else(|| started.elapsed());
+    let mut text = describe(&volume, took.as_secs_f64() * 1e3 / survey.pieces.len() as f64);
     let floor_m = args.floor.or(up::floor_m(&survey, &turn).map(|floor| floor as f32)).unwrap_or_default();
     let maker = Maker { survey: &survey, volume, floor_m, folder, terminal };
     text += &format!("floor: {:.2} m below the first camera\n", first_height_m(&survey, &turn) - floor_m);

@@ -20,6 +20,10 @@ const VOTES: usize = 7;
 const SAME_SHARE: f32 = 0.04;
 const SAME_M: f32 = 0.04;
 
+/// Every so many cells light is compared, and so many must be seen by both.
+const LIGHT_STEP: usize = 37;
+const LIGHT_CELLS: usize = 50;
+
 /// A view without what moves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Background {
@@ -29,6 +33,41 @@ pub struct Background {
     pub depth_m: Image<f32>,
     /// Whether the colour is known.
     pub valid: Image<bool>,
+}
+
+/// A piece that is asked.
+struct Source {
+    /// How far its view is from the one wanted.
+    apart: f64,
+    number: usize,
+    t_view_source: Isometry3<f32>,
+    /// What its colours are multiplied by: exposure changes from frame to frame.
+    gain: Vector3<f32>,
+}
+
+impl Source {
+    /// The colour that it has for a point of the view.
+    fn look(&self, survey: &Survey, point: &Point3<f32>) -> Option<Vector3<f32>> {
+        let one = survey.pieces.get(self.number)?;
+        let p = self.t_view_source.inverse_transform_point(point);
+        look(&survey.grid, &one.piece, survey.grid.project(&p)?, p.z)
+    }
+
+    /// Brings its light to that of the view's own piece, by what both see.
+    fn match_light(&mut self, survey: &Survey, grid: &CellGrid, own: &Piece) {
+        let (mut ours, mut theirs, mut count) = (Vector3::zeros(), Vector3::zeros(), 0);
+        for (cell, [x, y]) in grid.rays().iter().enumerate().step_by(LIGHT_STEP) {
+            let Some(z) = own.surface_m(cell) else { continue };
+            if let Some(color) = self.look(survey, &Point3::new(x * z, y * z, z)) {
+                ours += Vector3::from(own.color(cell).map(f32::from));
+                theirs += color;
+                count += 1;
+            }
+        }
+        if count >= LIGHT_CELLS {
+            self.gain = ours.zip_map(&theirs, |ours, theirs| (ours / theirs.max(1.0)).clamp(0.5, 2.0));
+        }
+    }
 }
 
 /// The view from `t_world_cam` on the cells of `grid`. Of the view's `own` piece, on the same cells, what does not move is kept; piece
@@ -41,13 +80,16 @@ pub fn background(
     own: Option<&Piece>,
     except: Option<usize>,
 ) -> Background {
-    let mut sources: Vec<(f64, usize, Isometry3<f32>)> = Vec::new();
+    let mut sources: Vec<Source> = Vec::new();
     for (number, one) in survey.pieces.iter().enumerate().filter(|(number, _)| Some(*number) != except) {
         let t_view_source = t_world_cam.inverse() * one.t_world_cam;
         let apart = t_view_source.translation.vector.norm() + 2.0 * t_view_source.rotation.angle();
-        sources.push((apart, number, t_view_source.cast()));
+        sources.push(Source { apart, number, t_view_source: t_view_source.cast(), gain: Vector3::repeat(1.0) });
     }
-    sources.sort_by(|a, b| a.0.total_cmp(&b.0));
+    sources.sort_by(|a, b| a.apart.total_cmp(&b.apart));
+    if let Some(own) = own {
+        sources.iter_mut().take(SOURCES).for_each(|source| source.match_light(survey, grid, own));
+    }
     let mut depth_m = projected_depth(survey, volume, grid, &sources);
     let mut color = RgbImage::new(grid.columns(), grid.rows());
     let mut valid = Image::new(grid.columns(), grid.rows());
@@ -71,17 +113,12 @@ pub fn background(
 }
 
 /// Depth of the nearest static surface in each cell, m; 0 where there is none. Only what the volume has as occupied counts.
-fn projected_depth(
-    survey: &Survey,
-    volume: &Volume,
-    grid: &CellGrid,
-    sources: &[(f64, usize, Isometry3<f32>)],
-) -> Vec<f32> {
+fn projected_depth(survey: &Survey, volume: &Volume, grid: &CellGrid, sources: &[Source]) -> Vec<f32> {
     let config = volume.config();
     let per_m = 1.0 / config.resolution_m;
     let (columns, rows) = (grid.columns() as i32, grid.rows() as i32);
     let mut depth_m = vec![0.0f32; grid.columns() * grid.rows()];
-    for (_, number, t_view_source) in sources {
+    for Source { number, t_view_source, .. } in sources {
         let (Some(one), Some(pose)) = (survey.pieces.get(*number), volume.pose(*number)) else { continue };
         let pose: Isometry3<f32> = pose.cast();
         for (p, _) in one.piece.points(&survey.grid, config.max_range_m) {
@@ -92,7 +129,7 @@ fn projected_depth(
             }
             // A cell of the source covers this many of the view.
             let scale = p.z / seen.z * survey.grid.stride_px() as f32 / grid.stride_px() as f32;
-            let reach = (0.5 * scale).clamp(0.5, 4.0);
+            let reach = (0.5 * scale + 0.6).clamp(0.6, 4.0);
             let range =
                 |at: f32, end: i32| ((at - reach).ceil().max(0.0) as i32, ((at + reach).floor() as i32).min(end - 1));
             let ((left, right), (top, bottom)) = (range(column, columns), range(row, rows));
@@ -110,13 +147,11 @@ fn projected_depth(
 }
 
 /// Median colour that the nearest sources give a point of the view, channel by channel.
-fn vote(survey: &Survey, sources: &[(f64, usize, Isometry3<f32>)], point: &Point3<f32>) -> Option<[u8; 3]> {
+fn vote(survey: &Survey, sources: &[Source], point: &Point3<f32>) -> Option<[u8; 3]> {
     let mut votes: Vec<[u8; 3]> = Vec::with_capacity(VOTES);
-    for (_, number, t_view_source) in sources.iter().take(SOURCES) {
-        let Some(one) = survey.pieces.get(*number) else { continue };
-        let p = t_view_source.inverse_transform_point(point);
-        let Some(at) = survey.grid.project(&p) else { continue };
-        votes.extend(look(&survey.grid, &one.piece, at, p.z));
+    for source in sources.iter().take(SOURCES) {
+        let color = source.look(survey, point).map(|color| color.component_mul(&source.gain));
+        votes.extend(color.map(|color| color.data.0[0].map(|v| (v + 0.5) as u8)));
         if votes.len() == VOTES {
             break;
         }
@@ -131,7 +166,7 @@ fn vote(survey: &Survey, sources: &[(f64, usize, Isometry3<f32>)], point: &Point
 }
 
 /// The colour of a piece at a position, between its cells; `None` if another surface or something that moves is there.
-fn look(grid: &CellGrid, piece: &Piece, [column, row]: [f32; 2], z: f32) -> Option<[u8; 3]> {
+fn look(grid: &CellGrid, piece: &Piece, [column, row]: [f32; 2], z: f32) -> Option<Vector3<f32>> {
     let (left, top) = (column.floor(), row.floor());
     let (dx, dy) = (column - left, row - top);
     let (mut sum, mut weights, mut same) = (Vector3::<f32>::zeros(), 0.0, false);
@@ -157,7 +192,7 @@ fn look(grid: &CellGrid, piece: &Piece, [column, row]: [f32; 2], z: f32) -> Opti
         sum += Vector3::from(piece.color(cell).map(f32::from)) * weight;
         weights += weight;
     }
-    (same && weights > 0.0).then(|| (sum / weights).data.0[0].map(|v| (v + 0.5) as u8))
+    (same && weights > 0.0).then(|| sum / weights)
 }
 
 #[cfg(test)]

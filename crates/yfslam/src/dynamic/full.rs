@@ -11,6 +11,7 @@ use crate::dynamic::views::Views;
 use crate::dynamic::yf::DepthGroups;
 use crate::dynamic::{Evidence, FirstPose, Region, Tie};
 use crate::features::FrameFeatures;
+use crate::image::DepthImage;
 
 /// Outlines bodies and what has moved. Buffers are reused.
 #[derive(Clone, Debug, Default)]
@@ -97,9 +98,22 @@ impl Full {
         }
     }
 
-    /// Whether a position of the raw image, px, lies on something that moves or within `edge_px` of it.
-    pub fn moves_at(&self, raw: [f32; 2], edge_px: f32) -> bool {
-        self.bodies.covers(raw, edge_px)
+    /// The outlines of what moves in the last frame.
+    pub fn bodies(&self) -> &BodyMask {
+        &self.bodies
+    }
+
+    /// The outlines of the bodies of tracks, whatever method made them.
+    pub fn outlines(
+        config: &DynamicConfig,
+        groups: &mut DepthGroups,
+        tracks: &mut Tracks,
+        depth: &DepthImage,
+    ) -> BodyMask {
+        let mut full = Self::default();
+        full.bodies.begin(depth);
+        full.outline(config, groups, tracks, 0.0);
+        full.bodies
     }
 
     /// Forgets all views.

@@ -20,6 +20,7 @@ use crate::geometry::Pose;
 use crate::image::{DepthImage, Image};
 use crate::map::{KeyFrameId, Map};
 use crate::sensor::SensorModel;
+use body_mask::BodyMask;
 use full::Full;
 use tracks::Tracks;
 
@@ -76,11 +77,27 @@ pub struct FirstPose<'a> {
 /// A keyframe and the pose of a frame seen from there, `t_cam_reference`: it moves along when the map is corrected.
 pub type Tie = (KeyFrameId, Pose);
 
+/// What moves in a frame, pixel by pixel.
+#[derive(Clone, Debug, Default)]
+pub struct MovingMask {
+    bodies: BodyMask,
+    regions: Vec<Region>,
+}
+
+impl MovingMask {
+    /// Whether a position of the raw image, px, shows something that moves, or lies within `edge_px` of it.
+    pub fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
+        self.bodies.covers(raw, edge_px) || self.regions.iter().any(|region| region.covers(depth, raw, edge_px))
+    }
+}
+
 /// Decides about the features of one frame after another.
 #[derive(Clone, Debug, Default)]
 pub struct DynamicFilter {
     tracks: Tracks,
     regions: Vec<Region>,
+    /// Regions whose features are needed, though they move.
+    given_up: Vec<Region>,
     groups: yf::DepthGroups,
     full: Full,
 }
@@ -94,6 +111,7 @@ impl DynamicFilter {
     /// Sets the trust of `features` from what boxes, masks and depth tell, before the pose is known.
     pub fn before_pose(&mut self, config: &DynamicConfig, evidence: &Evidence<'_>, features: &mut FrameFeatures) {
         self.regions.clear();
+        self.given_up.clear();
         let &Evidence { movable, depth, scale_factors, .. } = evidence;
         let size = [depth.raw.width(), depth.raw.height()];
         match config.method {
@@ -112,7 +130,7 @@ impl DynamicFilter {
                 return;
             }
         }
-        apply(config, &mut self.regions, depth, features, scale_factors);
+        apply(config, &mut self.regions, &mut self.given_up, depth, features, scale_factors);
     }
 
     /// Sharpens the trust of `features` when a first pose stands. Returns whether that changed.
@@ -132,12 +150,19 @@ impl DynamicFilter {
         &self.regions
     }
 
-    /// Whether a position of the raw image, px, shows something that moves in the last frame, or lies within `edge_px` of it.
-    pub fn moves_at(&self, config: &DynamicConfig, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
-        match config.method {
-            Method::Full => self.full.moves_at(raw, edge_px),
-            _ => self.regions.iter().any(|region| region.covers(depth, raw, edge_px)),
-        }
+    /// What moves in the last frame, whose depth image is given, pixel by pixel: more than features need, for whoever maps surfaces. What
+    /// was given up for want of features counts, and bodies are outlined whatever the method.
+    pub fn moving_mask(&self, config: &DynamicConfig, depth: &DepthImage) -> MovingMask {
+        let bodies = match config.method {
+            Method::None | Method::Boxes => BodyMask::default(),
+            Method::Yf => Full::outlines(config, &mut self.groups.clone(), &mut self.tracks.clone(), depth),
+            Method::Full => self.full.bodies().clone(),
+        };
+        let regions = match config.method {
+            Method::Full => Vec::new(),
+            _ => self.regions.iter().chain(&self.given_up).copied().collect(),
+        };
+        MovingMask { bodies, regions }
     }
 
     /// Forgets earlier views: the world begins anew.
@@ -151,6 +176,7 @@ impl DynamicFilter {
 fn apply(
     config: &DynamicConfig,
     regions: &mut Vec<Region>,
+    given_up: &mut Vec<Region>,
     depth: &DepthImage,
     features: &mut FrameFeatures,
     scale_factors: &[f32],
@@ -164,9 +190,11 @@ fn apply(
             f.trust = if moving { 0.0 } else { 1.0 };
             trusted += usize::from(!moving);
         }
-        if trusted >= config.min_trusted.min(features.len()) || regions.pop().is_none() {
+        if trusted >= config.min_trusted.min(features.len()) {
             return;
         }
+        let Some(region) = regions.pop() else { return };
+        given_up.push(region);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Slam;
 use crate::detection::Detection;
-use crate::dynamic::Region;
+use crate::dynamic::{MovingMask, Region};
 use crate::geometry::Pose;
 use crate::image::DepthImage;
 use crate::loops::LoopClosed;
@@ -83,10 +83,9 @@ impl Slam {
         self.filter.regions()
     }
 
-    /// Whether a position of the raw image, px, shows something that moves in the last frame, whose depth is given, or lies within
-    /// `edge_px` of it.
-    pub fn moves_at(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
-        self.filter.moves_at(&self.config.dynamic, depth, raw, edge_px)
+    /// What moves in the last frame, whose depth image is given, pixel by pixel.
+    pub fn moving_mask(&self, depth: &DepthImage) -> MovingMask {
+        self.filter.moving_mask(&self.config.dynamic, depth)
     }
 
     /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
