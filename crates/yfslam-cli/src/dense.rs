@@ -6,15 +6,23 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
+use yfslam::dense::cloud::cloud;
 use yfslam::dense::persist::encode;
-use yfslam::dense::{DenseConfig, DenseMapper, Survey};
+use yfslam::dense::{DenseConfig, DenseMapper, Survey, up};
+use yfslam::image::RgbImage;
 use yfslam::{Camera, Execution, RgbdFrame};
+use yfslam_eval::report::DenseMap;
 use yfslam_io::write_atomically;
 
+use crate::dense_picture::{SHOWN_M, from_above, from_corner};
+use crate::moments::to_png;
 use crate::pipeline::Pipeline;
 
 /// Name of the file in the output folder.
 pub const DENSE_FILE: &str = "dense.map";
+
+/// Width and height of the report's pictures, px.
+const PICTURE_PX: [usize; 2] = [480, 360];
 
 /// The dense map in the making.
 pub struct DenseRun {
@@ -66,4 +74,25 @@ impl DenseRun {
 pub fn write(folder: &Path, survey: &Survey) -> Result<()> {
     let bytes = encode(survey)?;
     Ok(write_atomically(&folder.join(DENSE_FILE), |file| file.write_all(&bytes))?)
+}
+
+/// The map of the pieces, drawn for the report.
+///
+/// # Errors
+/// A picture is too large for PNG.
+pub fn pictures(survey: &Survey) -> Result<DenseMap> {
+    let config = DenseConfig::default();
+    let turn = up::of_survey(survey);
+    let volume = survey.volume(&config, &turn, |_| {});
+    let points = cloud(survey, &volume, |_| {});
+    let cut_m = up::floor_m(survey, &turn).unwrap_or_default() as f32 + SHOWN_M;
+    let above = from_above(&points, config.resolution_m, cut_m, PICTURE_PX);
+    let corner = from_corner(&points, config.resolution_m, cut_m, PICTURE_PX);
+    let png = |image: &RgbImage| -> Result<_> { Ok((to_png(image)?, [image.width(), image.height()])) };
+    Ok(DenseMap {
+        keyframes: survey.pieces.len(),
+        occupied: volume.voxels().filter(|known| known.occupied).count(),
+        resolution_m: config.resolution_m,
+        views: [png(&above)?, png(&corner)?],
+    })
 }

@@ -7,8 +7,12 @@ use nalgebra::{Point3, Vector3};
 use yfslam::dense::cloud::CloudPoint;
 use yfslam::image::{Image, RgbImage};
 
+/// Height above the floor from which pictures leave out what is there, m.
+pub const SHOWN_M: f32 = 1.9;
 /// What is behind everything.
 const PAPER: [u8; 3] = [250, 250, 250];
+/// Paper around the map, m.
+const MARGIN_M: f32 = 0.2;
 /// Shades by which points look solid: lighter above, darker below.
 const SHADE: [f32; 2] = [0.8, 1.1];
 
@@ -45,17 +49,17 @@ impl Canvas {
     }
 }
 
-/// The map from above: x to the right, y up.
-pub fn from_above(points: &[CloudPoint], resolution_m: f32, cut_m: f32, width: usize) -> RgbImage {
+/// The map from above, as large as fits: x up, y to the left, as the first picture looks.
+pub fn from_above(points: &[CloudPoint], resolution_m: f32, cut_m: f32, [width, height]: [usize; 2]) -> RgbImage {
     let shown = || points.iter().filter(|p| p.position_m[2] < cut_m);
-    let Some((low, high)) = bounds(shown()) else { return Canvas::new(width, width / 2).image };
-    let margin = 0.2;
-    let scale = width as f32 / (high.x - low.x + 2.0 * margin);
-    let height = ((high.y - low.y + 2.0 * margin) * scale).ceil().clamp(1.0, 4.0 * width as f32) as usize;
     let mut canvas = Canvas::new(width, height);
+    let Some((low, high)) = bounds(shown()) else { return canvas.image };
+    let (wide, deep) = (high.y - low.y + 2.0 * MARGIN_M, high.x - low.x + 2.0 * MARGIN_M);
+    let scale = (width as f32 / wide).min(height as f32 / deep);
+    let middle = nalgebra::center(&low, &high);
     for p in shown() {
         let [x, y, z] = p.position_m;
-        let at = [(x - low.x + margin) * scale, (high.y + margin - y) * scale];
+        let at = [width as f32 / 2.0 - (y - middle.y) * scale, height as f32 / 2.0 - (x - middle.x) * scale];
         canvas.square(at, resolution_m * scale, -z, shaded(p, low.z, high.z));
     }
     canvas.image
@@ -117,8 +121,9 @@ mod tests {
             point([2.0, 1.0, 0.0], blue),
             point([2.0, 1.0, 2.6], white),
         ];
-        let picture = from_above(&points, 0.1, 2.0, 240);
-        let at = |x: f32, y: f32| picture.row(((1.2 - y) * 100.0) as usize)[((x + 0.2) * 100.0) as usize];
+        // 2.4 m up and 1.4 m across at 100 px a metre; x is up, y to the left.
+        let picture = from_above(&points, 0.1, 2.0, [140, 240]);
+        let at = |x: f32, y: f32| picture.row(((2.2 - x) * 100.0) as usize)[((1.2 - y) * 100.0) as usize];
         assert!(at(0.0, 0.0)[0] > 150 && at(0.0, 0.0)[2] == 0);
         assert!(at(2.0, 1.0)[2] > 150 && at(2.0, 1.0)[0] == 0);
         assert_eq!(at(1.0, 0.5), PAPER);

@@ -7,7 +7,7 @@ use yfslam::dense::DenseConfig;
 use yfslam::dynamic::Method;
 use yfslam::tracking::TrackingState;
 use yfslam::{Config, RgbdFrame, Slam};
-use yfslam_eval::report::Picture;
+use yfslam_eval::report::{DenseMap, Picture};
 use yfslam_eval::{EvalError, EvalOptions, Evaluation, ExpectedFrames};
 
 use crate::accuracy::{judge, to_eval};
@@ -72,6 +72,8 @@ pub struct Judged<'a> {
     /// `None` without ground truth.
     pub evaluation: Option<Result<Evaluation, EvalError>>,
     pub pictures: Vec<Picture>,
+    /// Its dense map in pictures, for the report.
+    pub dense: Option<DenseMap>,
 }
 
 impl Lane {
@@ -159,9 +161,11 @@ impl Lane {
         if let Some(survey) = &survey {
             dense::write(folder.path(), survey)?;
         }
+        let shown = survey.filter(|_| moments.is_some());
+        let dense = shown.map(|survey| dense::pictures(&survey)).transpose()?;
         let pictures = moments.map_or(Ok(Vec::new()), |moments| moments.to_pictures())?;
         let boxes = if needs_boxes { judge_by.boxes } else { &BoxOrigin::None };
-        Ok(Judged { config, folder, outcome, boxes, shared, evaluation, pictures })
+        Ok(Judged { config, folder, outcome, boxes, shared, evaluation, pictures, dense })
     }
 }
 

@@ -80,6 +80,16 @@ pub fn t_survey_world(survey: &Survey, world: &World) -> Isometry3<f64> {
     Isometry3::from_parts((center - rotation * center_exact).into(), rotation)
 }
 
+/// The survey as a run without drift would have it.
+pub fn survey_of_exact_poses(survey: &Survey, world: &World) -> Survey {
+    let turn = t_survey_world(survey, world);
+    let mut exact = survey.clone();
+    for one in &mut exact.pieces {
+        one.t_world_cam = turn * world.pose(index_of(world, one.timestamp_ns));
+    }
+    exact
+}
+
 /// Number of the frame with that stamp.
 pub fn index_of(world: &World, timestamp_ns: i64) -> usize {
     (timestamp_ns as f64 * 1e-9 * world.config().camera.fps).round() as usize

@@ -15,16 +15,17 @@ const BATCH: usize = 32;
 /// What came of it.
 pub struct Taken {
     pub survey: Survey,
-    /// Wall time for each keyframe, ms.
+    /// Wall time for each keyframe, ms: piece and volume.
     pub each_ms: f64,
     /// Memory of pieces and volume at the end.
     pub bytes: usize,
 }
 
 /// The dense map of a world by a method, as `yfslam run --dense` makes it.
-pub fn take(world: &World, method: Method, dense: &DenseConfig) -> Result<Taken> {
+pub fn take(world: &World, method: Method, dense: &DenseConfig, loops: bool) -> Result<Taken> {
     let mut config = Config::default();
     config.dynamic.method = method;
+    config.loops.enabled = loops;
     let mut slam = Slam::new(config.clone(), &world.config().camera, None)?;
     let mut mapper = DenseMapper::new(dense, &world.config().camera, Execution::Inline)?;
     let (mut seconds, mut keyframes, mut resets) = (0.0, 0usize, 0);

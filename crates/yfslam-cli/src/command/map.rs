@@ -20,7 +20,7 @@ use yfslam_io::write::{
 
 use crate::cpu;
 use crate::dense::DENSE_FILE;
-use crate::dense_picture::{from_above, from_corner};
+use crate::dense_picture::{SHOWN_M, from_above, from_corner};
 use crate::progress::Progress;
 use crate::terminal::Terminal;
 
@@ -42,8 +42,6 @@ In the output folder:
 
 The z-axis points up, x to the front of the first picture, y to its left (ROS, REP 103).";
 
-/// Height above the floor from which pictures leave out what is there, m.
-const SHOWN_M: f32 = 1.9;
 /// Views that are painted without people.
 const BACKGROUNDS: usize = 6;
 /// Units of their depth, as in TUM recordings, 1/m.
@@ -209,7 +207,7 @@ impl Maker<'_> {
         write_pcd(&self.folder.join("cloud.pcd"), points.iter().map(ply))?;
         let resolution_m = self.volume.config().resolution_m;
         let cut_m = self.floor_m + SHOWN_M;
-        let above = from_above(&points, resolution_m, cut_m, PICTURE_PX[0]);
+        let above = from_above(&points, resolution_m, cut_m, PICTURE_PX);
         write_color_png(&self.folder.join("above.png"), &above)?;
         let corner = from_corner(&points, resolution_m, cut_m, PICTURE_PX);
         write_color_png(&self.folder.join("corner.png"), &corner)?;

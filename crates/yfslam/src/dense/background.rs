@@ -112,7 +112,8 @@ pub fn background(
     Background { color, depth_m, valid }
 }
 
-/// Depth of the nearest static surface in each cell, m; 0 where there is none. Only what the volume has as occupied counts.
+/// Depth of the nearest static surface in each cell, m; 0 where there is none. Of what is in its range, only
+/// what the volume has as occupied counts.
 fn projected_depth(survey: &Survey, volume: &Volume, grid: &CellGrid, sources: &[Source]) -> Vec<f32> {
     let config = volume.config();
     let per_m = 1.0 / config.resolution_m;
@@ -121,10 +122,11 @@ fn projected_depth(survey: &Survey, volume: &Volume, grid: &CellGrid, sources: &
     for Source { number, t_view_source, .. } in sources {
         let (Some(one), Some(pose)) = (survey.pieces.get(*number), volume.pose(*number)) else { continue };
         let pose: Isometry3<f32> = pose.cast();
-        for (p, _) in one.piece.points(&survey.grid, config.max_range_m) {
+        for (p, _) in one.piece.points(&survey.grid, f32::INFINITY) {
             let seen = t_view_source * p;
             let Some([column, row]) = grid.project(&seen) else { continue };
-            if !volume.is_occupied(voxel_at(&(pose * p), per_m)) {
+            // Far away the volume says nothing.
+            if p.z <= config.max_range_m && !volume.is_occupied(voxel_at(&(pose * p), per_m)) {
                 continue;
             }
             // A cell of the source covers this many of the view.

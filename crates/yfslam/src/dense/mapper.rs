@@ -149,7 +149,7 @@ impl DenseMapper {
 
     /// Bytes of memory that the pieces take.
     pub fn bytes(&self) -> usize {
-        self.len() * self.grid.rays().len() * (size_of::<u16>() + size_of::<[u8; 3]>())
+        self.len() * self.grid.rays().len() * Piece::BYTES_PER_CELL
     }
 
     /// Forgets all: the map was begun anew.

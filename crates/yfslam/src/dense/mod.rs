@@ -66,6 +66,11 @@ pub struct SurveyPiece {
 }
 
 impl Survey {
+    /// Bytes of memory that the pieces take.
+    pub fn bytes(&self) -> usize {
+        self.pieces.len() * self.grid.rays().len() * Piece::BYTES_PER_CELL
+    }
+
     /// The volume of all pieces in a world turned by `turn`. `told` hears how many pieces are done.
     pub fn volume(&self, config: &DenseConfig, turn: &UnitQuaternion<f64>, mut told: impl FnMut(usize)) -> Volume {
         let mut volume = Volume::new(config);

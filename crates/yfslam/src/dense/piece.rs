@@ -84,7 +84,7 @@ pub struct Reading {
     pub moves: bool,
 }
 
-/// Cells with depth and colour.
+/// Cells with depth and colour. Made by [`Piece::cut`], or of what is known otherwise by [`Piece::of_depths`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Piece {
     /// Depth in [`UNIT_M`] and the mark [`MOVING`]; 0 where nothing was measured, or at an edge. Row-major.
@@ -94,6 +94,9 @@ pub struct Piece {
 }
 
 impl Piece {
+    /// Memory that a cell takes: depth and colour.
+    pub const BYTES_PER_CELL: usize = size_of::<u16>() + size_of::<[u8; 3]>();
+
     /// Cuts the piece of a frame: `moves(position, edge)` tells whether a position of the image, px, is within `edge` px of what moves.
     pub fn cut(
         config: &DenseConfig,
@@ -115,6 +118,13 @@ impl Piece {
             cells.push(if kept { ((z / UNIT_M + 0.5) as u16).min(MOVING - 1) | mark } else { mark });
         }
         Self { depth: cells, color: cell_colors(grid, color) }
+    }
+
+    /// The piece of depths, m (0 where nothing was measured), that are exact and stand still, of one colour.
+    pub fn of_depths(depths_m: impl IntoIterator<Item = f32>, color: [u8; 3]) -> Self {
+        let units = |z: f32| ((z / UNIT_M + 0.5) as u16).min(MOVING - 1);
+        let depth: Vec<u16> = depths_m.into_iter().map(units).collect();
+        Self { color: vec![color; depth.len()], depth }
     }
 
     /// What a cell measured; `None` where there is no depth.

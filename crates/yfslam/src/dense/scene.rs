@@ -21,12 +21,10 @@ pub fn camera() -> Camera {
 
 /// A wall at `depth_m` with, in the middle, a square thing at `thing_m`.
 pub fn wall(grid: &CellGrid, depth_m: f32, thing_m: Option<f32>) -> Piece {
-    let units = |z: f32| (z / 0.0005).round() as u16;
     let is_middle = |cell: usize| {
         let (column, row) = (cell % grid.columns(), cell / grid.columns());
         column.abs_diff(grid.columns() / 2) < 8 && row.abs_diff(grid.rows() / 2) < 8
     };
-    let at = |cell: usize| units(thing_m.filter(|_| is_middle(cell)).unwrap_or(depth_m));
-    let cells = grid.columns() * grid.rows();
-    Piece { depth: (0..cells).map(at).collect(), color: vec![[120, 130, 140]; cells] }
+    let at = |cell: usize| thing_m.filter(|_| is_middle(cell)).unwrap_or(depth_m);
+    Piece::of_depths((0..grid.columns() * grid.rows()).map(at), [120, 130, 140])
 }

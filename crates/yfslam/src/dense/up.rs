@@ -112,9 +112,9 @@ mod tests {
         let (sin, cos) = pitch.sin_cos();
         let depth = |[_, y]: &[f32; 2]| {
             let down = sin + cos * f64::from(*y);
-            if down > 0.2 { (1.2 / down / 0.0005) as u16 } else { 0 }
+            if down > 0.2 { (1.2 / down) as f32 } else { 0.0 }
         };
-        let piece = Piece { depth: grid.rays().iter().map(depth).collect(), color: vec![[90; 3]; grid.rays().len()] };
+        let piece = Piece::of_depths(grid.rays().iter().map(depth), [90; 3]);
         Survey {
             pieces: vec![SurveyPiece { timestamp_ns: 0, t_world_cam: crate::geometry::Pose::identity(), piece }],
             grid,
