@@ -1,5 +1,7 @@
 //! `yfslam map`: what it writes opens elsewhere, is the same on every run, and shows the world without people.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
+
 mod common;
 #[path = "../examples/dense/judge.rs"]
 mod judge;
