@@ -3,9 +3,10 @@
 //! In: frames and the system that has just seen them. Out: `dense.map`, from which `yfslam map` makes what people use.
 
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use serde::Serialize;
 use yfslam::dense::cloud::cloud;
 use yfslam::dense::persist::encode;
 use yfslam::dense::{DenseConfig, DenseMapper, Survey, up};
@@ -14,6 +15,7 @@ use yfslam::{Camera, Execution, RgbdFrame};
 use yfslam_eval::report::DenseMap;
 use yfslam_io::write_atomically;
 
+use crate::cpu;
 use crate::dense_picture::{SHOWN_M, from_above, from_corner};
 use crate::moments::to_png;
 use crate::pipeline::Pipeline;
@@ -28,6 +30,23 @@ const PICTURE_PX: [usize; 2] = [480, 360];
 pub struct DenseRun {
     mapper: DenseMapper,
     resets: usize,
+    /// Pieces cut, and the processor time of this thread for them and for following the map.
+    pieces: u32,
+    cpu: Option<Duration>,
+}
+
+/// What a dense map took.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct DenseCost {
+    /// Keyframes of which a piece was cut.
+    pub keyframes: u32,
+    /// Processor time of the thread of tracking for each, ms: cutting the piece and, unless mapping has threads of its own, following the
+    /// map; `null` where the system does not tell.
+    pub cpu_ms_per_keyframe: Option<f64>,
+    /// Memory of the pieces, MB (10⁶ bytes).
+    pub pieces_mb: f64,
+    /// Pieces that came when the dense map's thread was busy, and were left out.
+    pub passed_over: usize,
 }
 
 impl DenseRun {
@@ -36,7 +55,12 @@ impl DenseRun {
     /// # Errors
     /// For a value of the configuration that cannot work, or if a thread cannot be started.
     pub fn new(config: &DenseConfig, camera: &Camera, execution: Execution) -> Result<Self> {
-        Ok(Self { mapper: DenseMapper::new(config, camera, execution)?, resets: 0 })
+        Ok(Self {
+            mapper: DenseMapper::new(config, camera, execution)?,
+            resets: 0,
+            pieces: 0,
+            cpu: Some(Duration::ZERO),
+        })
     }
 
     /// Takes note of the frame that the pipeline saw last: if it became a keyframe, its piece is cut, and all pieces follow the map.
@@ -50,14 +74,34 @@ impl DenseRun {
             return;
         }
         let Some(tie) = slam.last_frame().reference else { return };
-        let started = Instant::now();
-        let moving = slam.moving_mask(&frame.depth);
-        let piece = self.mapper.cut(&frame.color, &frame.depth, |at, edge| moving.covers(&frame.depth, at, edge));
-        let cut = started.elapsed();
-        self.mapper.hang(frame.timestamp_ns, tie, piece, slam.map());
-        let followed = started.elapsed() - cut;
-        pipeline.stages.push("dense piece", cut);
-        pipeline.stages.push("dense map", followed);
+        if !self.mapper.is_due(frame.timestamp_ns, &slam.last_frame().t_cam_world.inverse()) {
+            return;
+        }
+        let (took, cpu) = cpu::timed(|| {
+            let started = Instant::now();
+            let moving = slam.moving_mask(&frame.depth);
+            let moves = |at, edge| moving.covers(&frame.depth, at, edge);
+            let piece = self.mapper.cut(&frame.color, &frame.depth, moves);
+            let cut = started.elapsed();
+            self.mapper.hang(frame.timestamp_ns, tie, piece, slam.map());
+            [cut, started.elapsed() - cut]
+        });
+        self.pieces += 1;
+        self.cpu = self.cpu.zip(cpu).map(|(sum, took)| sum + took);
+        for (stage, took) in ["dense piece", "dense map"].into_iter().zip(took) {
+            pipeline.stages.push(stage, took);
+        }
+    }
+
+    /// What it took.
+    pub fn cost(&self) -> DenseCost {
+        let each_ms = |cpu: Duration| (cpu.as_secs_f64() * 1e6 / f64::from(self.pieces.max(1))).round() / 1e3;
+        DenseCost {
+            keyframes: self.pieces,
+            cpu_ms_per_keyframe: self.cpu.map(each_ms),
+            pieces_mb: (self.mapper.bytes() as f64 / 1e5).round() / 10.0,
+            passed_over: self.mapper.passed_over(),
+        }
     }
 
     /// The pieces, where the map has them at the end.

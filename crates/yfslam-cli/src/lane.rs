@@ -12,7 +12,7 @@ use yfslam_eval::{EvalError, EvalOptions, Evaluation, ExpectedFrames};
 
 use crate::accuracy::{judge, to_eval};
 use crate::boxes::{BoxOrigin, DetectionTally};
-use crate::dense::{self, DenseRun};
+use crate::dense::{self, DenseCost, DenseRun};
 use crate::detector::LoadedDetector;
 use crate::map::MapArgs;
 use crate::moments::Moments;
@@ -74,6 +74,7 @@ pub struct Judged<'a> {
     pub pictures: Vec<Picture>,
     /// Its dense map in pictures, for the report.
     pub dense: Option<DenseMap>,
+    pub dense_cost: Option<DenseCost>,
 }
 
 impl Lane {
@@ -142,6 +143,7 @@ impl Lane {
             return Err(failure);
         }
         map.save(&mut pipeline)?;
+        let dense_cost = dense.as_ref().map(DenseRun::cost);
         let survey = dense.map(|dense| dense.finish(&mut pipeline));
         let mut outcome = pipeline.finish(&config)?;
         let mut shared = judge_by.reading.clone();
@@ -165,7 +167,7 @@ impl Lane {
         let dense = shown.map(|survey| dense::pictures(&survey)).transpose()?;
         let pictures = moments.map_or(Ok(Vec::new()), |moments| moments.to_pictures())?;
         let boxes = if needs_boxes { judge_by.boxes } else { &BoxOrigin::None };
-        Ok(Judged { config, folder, outcome, boxes, shared, evaluation, pictures, dense })
+        Ok(Judged { config, folder, outcome, boxes, shared, evaluation, pictures, dense, dense_cost })
     }
 }
 

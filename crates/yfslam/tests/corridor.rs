@@ -8,8 +8,8 @@ use yfslam::dense::{CellGrid, DenseConfig, Piece, Survey, SurveyPiece, Volume};
 /// Half the width of the corridor, and how far floor and ceiling are from the camera, m.
 const WALL_M: f32 = 1.2;
 const FLOOR_M: f32 = 1.35;
-/// Way from keyframe to keyframe, m: as many as the tracker makes in such a corridor.
-const STEP_M: f32 = 0.25;
+/// Way from piece to piece, m: a robot of 0.4 m/s makes one each half second.
+const STEP_M: f32 = 0.2;
 
 /// The depth of a cell of a camera that looks along the corridor, turned by `angle` about its vertical axis; the sensor sees 8 m.
 fn depth_m([x, y]: [f32; 2], angle: f32) -> f32 {

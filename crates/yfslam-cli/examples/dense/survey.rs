@@ -44,6 +44,9 @@ pub fn take(world: &World, method: Method, dense: &DenseConfig, loops: bool) -> 
                 mapper.clear();
             }
             let Some(tie) = slam.last_frame().reference.filter(|_| tracked.is_keyframe) else { continue };
+            if !mapper.is_due(frame.timestamp_ns, &slam.last_frame().t_cam_world.inverse()) {
+                continue;
+            }
             let started = Instant::now();
             let moving = slam.moving_mask(&frame.depth);
             let piece = mapper.cut(&frame.color, &frame.depth, |at, edge| moving.covers(&frame.depth, at, edge));

@@ -14,6 +14,12 @@ config_section! {
         max_range_m: f32 = 4.0,
         /// Pixels along each side of a cell of a piece. At 2 a keyframe takes 0.4 MB of memory.
         stride_px: usize = 2,
+        /// A keyframe becomes a piece if since the last one the camera has moved this far, m,
+        min_move_m: f64 = 0.25,
+        /// or turned this far, degrees,
+        min_turn_deg: f64 = 10.0,
+        /// or this time has passed, s: views that show the same cost memory and tell little.
+        min_gap_s: f64 = 0.5,
         /// Distance from what moves within which depth is not believed, px: edges of structured-light depth are off by some.
         edge_px: f32 = 8.0,
         /// Difference of depth within three by three cells that makes an edge, m: this,

@@ -27,6 +27,8 @@ pub struct DenseMapper {
     config: DenseConfig,
     grid: CellGrid,
     ties: Vec<Tie>,
+    /// Time and pose, world from camera, of the last piece as it was cut.
+    last: Option<(i64, Pose)>,
     keeper: Keeper,
     passed_over: usize,
 }
@@ -77,7 +79,17 @@ impl DenseMapper {
                 Keeper::Threaded { sender, thread: builder.spawn(move || store.obey(&orders))? }
             }
         };
-        Ok(Self { config: config.clone(), grid, ties: Vec::new(), keeper, passed_over: 0 })
+        Ok(Self { config: config.clone(), grid, ties: Vec::new(), last: None, keeper, passed_over: 0 })
+    }
+
+    /// Whether a keyframe tells enough beyond the last piece to become one.
+    pub fn is_due(&self, timestamp_ns: i64, t_world_cam: &Pose) -> bool {
+        let Some((last_ns, last)) = &self.last else { return true };
+        let moved = last.inverse() * t_world_cam;
+        let config = &self.config;
+        moved.translation.vector.norm() >= config.min_move_m
+            || moved.rotation.angle().to_degrees() >= config.min_turn_deg
+            || timestamp_ns.saturating_sub(*last_ns) as f64 * 1e-9 >= config.min_gap_s
     }
 
     /// Cuts the piece of a frame: `moves(position, edge)` tells whether a position of the image, px, is within `edge` px of what moves.
@@ -89,9 +101,12 @@ impl DenseMapper {
     pub fn hang(&mut self, timestamp_ns: i64, tie: Tie, piece: Piece, map: &Map) {
         self.ties.push(tie);
         let poses = self.poses(map);
+        let pose = poses.last().copied().flatten();
         if !self.keeper.follow(Some((timestamp_ns, piece)), poses) {
             self.ties.pop();
             self.passed_over += 1;
+        } else if let Some(pose) = pose {
+            self.last = Some((timestamp_ns, pose));
         }
     }
 
@@ -155,6 +170,7 @@ impl DenseMapper {
     /// Forgets all: the map was begun anew.
     pub fn clear(&mut self) {
         self.ties.clear();
+        self.last = None;
         match &mut self.keeper {
             Keeper::Inline(store) => store.clear(),
             Keeper::Threaded { sender, .. } => {
@@ -283,6 +299,19 @@ mod tests {
             assert_eq!(voxels(&volumes[k]), voxels(&volumes[k + 3]));
         }
         assert!(voxels(&volumes[2]).len() > 1000);
+    }
+
+    #[test]
+    fn a_keyframe_that_shows_the_same_as_the_last_piece_is_not_due() {
+        let (map, ties) = map();
+        let mut mapper = mapper(Execution::Inline);
+        let at = |x: f64, turn: f64| Pose::new(nalgebra::Vector3::new(x, -0.01, 0.0), nalgebra::Vector3::y() * turn);
+        assert!(mapper.is_due(0, &at(0.0, 0.0)));
+        mapper.hang(0, ties[0], scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None), &map);
+        assert!(!mapper.is_due(100_000_000, &at(0.1, 0.05)));
+        for (time_ns, pose) in [(600_000_000, at(0.0, 0.0)), (1, at(0.3, 0.0)), (1, at(0.0, 0.2))] {
+            assert!(mapper.is_due(time_ns, &pose));
+        }
     }
 
     #[test]

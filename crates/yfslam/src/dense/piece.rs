@@ -23,6 +23,8 @@ pub struct CellGrid {
     camera: Camera,
     /// x = X/Z and y = Y/Z of each cell's middle, lens distortion removed.
     rays: Vec<[f32; 2]>,
+    /// Least and greatest of them: beyond, the lens model folds back into the picture.
+    bounds: [[f32; 2]; 2],
 }
 
 impl CellGrid {
@@ -32,8 +34,13 @@ impl CellGrid {
         let (columns, rows) = (camera.width / stride_px, camera.height / stride_px);
         let middle = |cell: usize| (cell * stride_px) as f64 + 0.5 * (stride_px - 1) as f64;
         let ray = |i: usize| camera.undistort(middle(i % columns), middle(i / columns)).map(|v| v as f32);
-        let rays = (0..columns * rows).map(ray).collect();
-        Self { columns, rows, stride_px, camera: camera.clone(), rays }
+        let rays: Vec<[f32; 2]> = (0..columns * rows).map(ray).collect();
+        let bounds = [0, 1].map(|axis| {
+            let range = rays.iter().map(|ray| ray[axis]).fold([f32::MAX, f32::MIN], |[a, b], v| [a.min(v), b.max(v)]);
+            let margin = 0.5 * stride_px as f32 / camera.fx.min(camera.fy) as f32;
+            [range[0] - margin, range[1] + margin]
+        });
+        Self { columns, rows, stride_px, camera: camera.clone(), rays, bounds }
     }
 
     /// Cells per row.
@@ -67,7 +74,11 @@ impl CellGrid {
         if p.z <= 0.0 {
             return None;
         }
-        let [u, v] = self.camera.distort(f64::from(p.x / p.z), f64::from(p.y / p.z));
+        let (x, y) = (p.x / p.z, p.y / p.z);
+        if [x, y].iter().zip(&self.bounds).any(|(v, [low, high])| v < low || v > high) {
+            return None;
+        }
+        let [u, v] = self.camera.distort(f64::from(x), f64::from(y));
         let half = 0.5 * (self.stride_px - 1) as f64;
         let (column, row) = ((u - half) / self.stride_px as f64, (v - half) / self.stride_px as f64);
         let inside = column > -0.5 && row > -0.5 && column < self.columns as f64 - 0.5 && row < self.rows as f64 - 0.5;
@@ -289,5 +300,9 @@ mod tests {
             assert!((row - (cell / grid.columns()) as f32).abs() < 1e-2, "{cell}: {row}");
         }
         assert_eq!(grid.project(&Point3::new(0.0, 0.0, -1.0)), None);
+        // The lens model has these near the middle again.
+        for x in [2.0, 3.0, 5.0] {
+            assert_eq!(grid.project(&Point3::new(x, 0.1, 1.0)), None, "{x}");
+        }
     }
 }
