@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 
-use crate::command::{bench, completions, config, demo, detect, eval, info, run, synth};
+use crate::command::{bench, completions, config, demo, detect, eval, info, map, run, synth};
 use crate::detector::describe_embedded;
 
 const EXAMPLES: &str = "\
@@ -44,6 +44,7 @@ pub struct Verbosity {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Run(Box<run::RunArgs>),
+    Map(map::DenseMapArgs),
     Eval(eval::EvalArgs),
     Demo(demo::DemoArgs),
     Detect(detect::DetectArgs),

@@ -50,7 +50,7 @@ fn page(runs: &[Run], shared: &Stages) -> Result<String> {
 }
 
 fn method<'a>(judged: &'a Judged, trajectory: &'a [StampedPose]) -> Result<MethodReport<'a>> {
-    let Judged { outcome, config, pictures, .. } = judged;
+    let Judged { outcome, config, pictures, dense, .. } = judged;
     let (name, summary) = describe(config.dynamic.method);
     let tally = &outcome.frames;
     Ok(MethodReport {
@@ -70,6 +70,7 @@ fn method<'a>(judged: &'a Judged, trajectory: &'a [StampedPose]) -> Result<Metho
             cpu_s: outcome.cpu.map(|cpu| cpu.as_secs_f64()),
         },
         pictures: pictures.clone(),
+        dense: dense.clone(),
         config: config.to_commented_toml()?,
     })
 }

@@ -3,13 +3,15 @@
 //! In: frames, which several lanes may share. Out: a [`Judged`] run, its files written.
 
 use anyhow::Result;
+use yfslam::dense::DenseConfig;
 use yfslam::tracking::TrackingState;
 use yfslam::{Config, RgbdFrame, Slam};
-use yfslam_eval::report::Picture;
+use yfslam_eval::report::{DenseMap, Picture};
 use yfslam_eval::{EvalError, EvalOptions, Evaluation, ExpectedFrames};
 
 use crate::accuracy::{judge, to_eval};
 use crate::boxes::{BoxOrigin, DetectionTally};
+use crate::dense::{self, DenseCost, DenseRun};
 use crate::detector::LoadedDetector;
 use crate::map::MapArgs;
 use crate::moments::Moments;
@@ -26,6 +28,7 @@ pub struct Lane {
     pub state: TrackingState,
     overlay: Option<Overlay>,
     moments: Option<Moments>,
+    dense: Option<DenseRun>,
     /// What ended it early.
     failure: Option<anyhow::Error>,
 }
@@ -37,6 +40,8 @@ pub struct Extras<'a> {
     pub overlay: bool,
     /// Evenly spread moments of which the report has a picture; `None` without a report.
     pub moments: Option<usize>,
+    /// A dense map.
+    pub dense: bool,
     pub map: &'a MapArgs,
 }
 
@@ -66,6 +71,9 @@ pub struct Judged<'a> {
     /// `None` without ground truth.
     pub evaluation: Option<Result<Evaluation, EvalError>>,
     pub pictures: Vec<Picture>,
+    /// Its dense map in pictures, for the report.
+    pub dense: Option<DenseMap>,
+    pub dense_cost: Option<DenseCost>,
 }
 
 impl Lane {
@@ -86,7 +94,11 @@ impl Lane {
         let (detector, times) = detector.map(|d| (d.detector, d.times)).unzip();
         let slam = extras.map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
         let pipeline = Pipeline::new(slam, times);
-        Ok(Self { config, folder, pipeline, overlay, moments, state: TrackingState::default(), failure: None })
+        let dense = extras
+            .dense
+            .then(|| DenseRun::new(&DenseConfig::default(), &source.camera.camera, extras.map.execution()))
+            .transpose()?;
+        Ok(Self { config, folder, pipeline, overlay, moments, dense, state: TrackingState::default(), failure: None })
     }
 
     /// Takes one frame through the pipeline.
@@ -96,6 +108,9 @@ impl Lane {
             Ok(frame) => {
                 self.state = self.pipeline.track(frame);
                 self.failure = self.picture(frame).err();
+                if let Some(dense) = &mut self.dense {
+                    dense.see(frame, &mut self.pipeline);
+                }
             }
             Err(skip) => self.pipeline.skip(skip.clone()),
         }
@@ -122,11 +137,13 @@ impl Lane {
     /// # Errors
     /// What ended it early, or why there is no trajectory; a file cannot be written.
     pub fn finish<'a>(self, judge_by: Judge<'a>, map: &MapArgs) -> Result<Judged<'a>> {
-        let Self { config, folder, mut pipeline, moments, failure, .. } = self;
+        let Self { config, folder, mut pipeline, moments, dense, failure, .. } = self;
         if let Some(failure) = failure {
             return Err(failure);
         }
         map.save(&mut pipeline)?;
+        let dense_cost = dense.as_ref().map(DenseRun::cost);
+        let survey = dense.map(|dense| dense.finish(&mut pipeline));
         let mut outcome = pipeline.finish(&config)?;
         let mut shared = judge_by.reading.clone();
         let needs_boxes = config.dynamic.method.needs_boxes();
@@ -142,9 +159,14 @@ impl Lane {
             judge(&truth.poses, &to_eval(&outcome.trajectory), options)
         });
         folder.write(&outcome, &config)?;
+        if let Some(survey) = &survey {
+            dense::write(folder.path(), survey)?;
+        }
+        let shown = survey.filter(|_| moments.is_some());
+        let dense = shown.map(|survey| dense::pictures(&survey)).transpose()?;
         let pictures = moments.map_or(Ok(Vec::new()), |moments| moments.to_pictures())?;
         let boxes = if needs_boxes { judge_by.boxes } else { &BoxOrigin::None };
-        Ok(Judged { config, folder, outcome, boxes, shared, evaluation, pictures })
+        Ok(Judged { config, folder, outcome, boxes, shared, evaluation, pictures, dense, dense_cost })
     }
 }
 

@@ -10,6 +10,8 @@ mod boxes;
 mod cli;
 mod command;
 mod cpu;
+mod dense;
+mod dense_picture;
 mod detector;
 mod draw;
 mod found;

@@ -39,13 +39,17 @@ impl MapArgs {
         options.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect()
     }
 
+    /// On which thread maps are made.
+    pub fn execution(&self) -> Execution {
+        if self.threaded { Execution::Threaded } else { Execution::Inline }
+    }
+
     /// A system that maps as was asked for.
     ///
     /// # Errors
     /// The map cannot be read, is none, or was made with other settings or, to be extended, with another camera.
     pub fn apply(&self, slam: Slam) -> Result<Slam> {
-        let execution = if self.threaded { Execution::Threaded } else { Execution::Inline };
-        let slam = slam.with_execution(execution)?;
+        let slam = slam.with_execution(self.execution())?;
         let Some(path) = &self.load_map else { return Ok(slam) };
         let map_use = if self.localise { MapUse::Localise } else { MapUse::Extend };
         slam.with_map(read(path)?, map_use).with_context(|| format!("the map {} does not fit", path.display()))

@@ -87,7 +87,11 @@ impl Moment {
     }
 }
 
-fn to_png(image: &RgbImage) -> Result<Vec<u8>> {
+/// The picture as PNG in few colours.
+///
+/// # Errors
+/// It is too large for PNG.
+pub fn to_png(image: &RgbImage) -> Result<Vec<u8>> {
     let rgba: Vec<u8> = image.data().iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
     let colors = NeuQuant::new(COLOR_SAMPLE, COLORS, &rgba);
     // Marks are small, and so have no say in the choice; they are what the picture is for.

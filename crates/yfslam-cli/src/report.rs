@@ -7,6 +7,7 @@ use yfslam_io::Fault;
 use yfslam_io::sequence::AssociationReport;
 
 use crate::boxes::BoxOrigin;
+use crate::dense::DenseCost;
 use crate::lane::Judged;
 use crate::pipeline::{DynamicTally, FrameTally, PlaceTally, Stages};
 use crate::source::{MaskTally, Source, Truth};
@@ -43,6 +44,8 @@ pub struct Report<'a> {
     /// Loops that were closed, and stretches over which the camera was lost.
     pub places: &'a PlaceTally,
     pub map: MapSize,
+    /// What the dense map took; `null` if none was made.
+    pub dense: Option<DenseCost>,
     /// Wall time of each stage over all frames; `mapping` over keyframes. Decoding runs beside all; `detector` runs beside `features`
     /// or, if the frames are taken through several methods, once for all of them.
     pub times: Stages,
@@ -97,6 +100,7 @@ impl<'a> Report<'a> {
             dynamic: &outcome.dynamic,
             places: &outcome.places,
             map: MapSize { keyframes: outcome.keyframes.len(), landmarks: outcome.landmarks.len() },
+            dense: judged.dense_cost,
             times: shared.and(&outcome.stages),
             wall_s: outcome.wall.as_secs_f64(),
             fps: outcome.fps(),

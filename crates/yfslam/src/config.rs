@@ -37,6 +37,7 @@ macro_rules! config_section {
         }
     };
 }
+pub(crate) use config_section;
 
 config_section! {
     /// ORB features (ORB-SLAM2, IEEE T-RO 2017, section III; Rublee et al., ICCV 2011).

@@ -21,6 +21,7 @@
 //! | [`tracking`] | the pose of each frame; when to make a keyframe |
 //! | [`mapping`] | growth and refinement of the map |
 //! | [`loops`] | places seen before: the way back when lost, and loops to close |
+//! | [`dense`] | what people use a map for: occupancy, clouds, grids, meshes, the view without people |
 //! | [`backend`] | the owner of the map, on the calling thread or its own |
 //! | [`system`] | the whole path |
 //!
@@ -54,6 +55,7 @@
 pub mod backend;
 pub mod camera;
 pub mod config;
+pub mod dense;
 pub mod detection;
 mod detector_thread;
 pub mod dynamic;
@@ -65,6 +67,7 @@ pub mod loops;
 pub mod map;
 pub mod mapping;
 pub mod optimize;
+pub mod packed;
 pub mod sensor;
 pub mod system;
 pub mod tracking;

@@ -7,6 +7,7 @@ pub mod demo;
 pub mod detect;
 pub mod eval;
 pub mod info;
+pub mod map;
 pub mod run;
 pub mod synth;
 
@@ -23,6 +24,7 @@ pub fn run(cli: &Cli) -> Result<()> {
     let terminal = Terminal::new(cli.verbosity);
     match &cli.command {
         Command::Run(args) => run::run(args, terminal),
+        Command::Map(args) => map::run(args, terminal),
         Command::Eval(args) => eval::run(args, terminal),
         Command::Demo(args) => demo::run(args, terminal),
         Command::Detect(args) => detect::run(args, terminal),

@@ -44,6 +44,7 @@ In the output folder:
   map.ply         landmarks with colour
   run.json        what was run, what became of the frames, times, errors
   config.toml     every setting of this run; give it to --config to repeat it
+  dense.map       with --dense, what `yfslam map` makes clouds, octrees, grids and meshes of
   overlay/        with --overlay, one picture a frame
   report.html     with --report, all of it on one page: figures, pictures, tables
 
@@ -86,6 +87,9 @@ pub struct RunArgs {
     /// Write a picture of each frame: boxes yellow, moving regions red, static features green, dynamic ones red.
     #[arg(long, help_heading = "Output")]
     overlay: bool,
+    /// Make a dense map on the way: `dense.map`, for `yfslam map`.
+    #[arg(long, help_heading = "Output")]
+    dense: bool,
     /// Write `report.html`: errors, trajectory, pictures and times on one page that needs no network.
     #[arg(long, help_heading = "Output")]
     report: bool,
@@ -197,7 +201,7 @@ fn lanes(
 ) -> Result<(Vec<Lane>, Option<SharedDetector>)> {
     let alone = methods.len() == 1;
     let moments = args.report.then_some(if alone { MOMENTS } else { MOMENTS_OF_EACH });
-    let extras = Extras { overlay: args.overlay, moments, map: &args.map };
+    let extras = Extras { overlay: args.overlay, moments, dense: args.dense, map: &args.map };
     let (mut own, shared) = if alone { (detector, None) } else { (None, detector) };
     let lane = |method: &Method| {
         let mut config = config.clone();

@@ -34,6 +34,7 @@ pub struct Pipeline {
     places: PlaceTally,
     live: Vec<StampedPose>,
     resets: usize,
+    made_keyframe: bool,
     detector_times: Option<Receiver<Took>>,
     cpu: Option<Duration>,
     started: Instant,
@@ -73,6 +74,7 @@ impl Pipeline {
             places: PlaceTally::default(),
             live: Vec::new(),
             resets: 0,
+            made_keyframe: false,
             detector_times,
             cpu: cpu::thread_time().map(|_| Duration::ZERO),
             started: Instant::now(),
@@ -86,6 +88,7 @@ impl Pipeline {
         let started = Instant::now();
         let (result, cpu) = cpu::timed(|| self.slam.track(frame));
         self.add_cpu(cpu);
+        self.made_keyframe = result.as_ref().is_ok_and(|tracked| tracked.is_keyframe);
         let tracked = match result {
             Ok(tracked) => tracked,
             Err(rejected) => {
@@ -122,6 +125,11 @@ impl Pipeline {
     /// The system as the last frame left it.
     pub fn slam(&self) -> &Slam {
         &self.slam
+    }
+
+    /// Whether the last frame became a keyframe.
+    pub fn made_keyframe(&self) -> bool {
+        self.made_keyframe
     }
 
     /// What became of the frames so far.
@@ -179,7 +187,7 @@ impl Pipeline {
     }
 
     /// Waits for mapping that is under way.
-    fn settle(&mut self) {
+    pub fn settle(&mut self) {
         if let (Some(closed), Some(last)) = (self.slam.settle(), self.live.last()) {
             self.places.close(last.timestamp_ns, &closed);
         }

@@ -6,6 +6,7 @@
 //! | bars of RMSE and S.D. | Fig. 6 |
 //! | trajectory from above and from the side, errors over time | Fig. 5 |
 //! | pictures with static and dynamic features | Fig. 7 |
+//! | dense map, if there is one | |
 //! | times | Table 5 |
 //!
 //! The same data give the same bytes. Measured times stand in elements with the attribute `data-timing`, and nowhere else: without
@@ -13,6 +14,7 @@
 
 mod axis;
 mod bars;
+mod dense;
 mod figure;
 mod ink;
 mod orientation;
@@ -68,6 +70,8 @@ pub struct MethodReport<'a> {
     pub times: Times,
     /// Pictures of some moments, in order of time.
     pub pictures: Vec<Picture>,
+    /// Its dense map, if one was made.
+    pub dense: Option<DenseMap>,
     /// The configuration, as text.
     pub config: String,
 }
@@ -122,6 +126,19 @@ pub struct Picture {
     pub size: [usize; 2],
     /// Features that were trusted, and those that were not.
     pub features: [usize; 2],
+}
+
+/// Pictures of a dense map.
+#[derive(Clone, Debug)]
+pub struct DenseMap {
+    /// Keyframes that it is made of.
+    pub keyframes: usize,
+    /// Voxels that are occupied.
+    pub occupied: usize,
+    /// Side of a voxel, m.
+    pub resolution_m: f32,
+    /// From above and from a corner: as PNG, with width and height, px.
+    pub views: [(Vec<u8>, [usize; 2]); 2],
 }
 
 impl Report<'_> {

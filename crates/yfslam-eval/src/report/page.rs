@@ -6,6 +6,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::axis::length;
 use super::bars::bars;
+use super::dense::dense;
 use super::ink::{self, Ink};
 use super::over_time::over_time;
 use super::scene::{Captioned, Scene};
@@ -36,6 +37,7 @@ pub fn page(report: &Report) -> Markup {
                     (trajectory(&scene))
                     (errors(report, &scene))
                     (pictures(report))
+                    (dense(report))
                     (times(report))
                     (setup(report))
                 }

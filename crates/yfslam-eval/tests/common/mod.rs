@@ -35,7 +35,17 @@ pub fn method<'a>(
     let frames = Frames { total: trajectory.len() + 90, tracked: trajectory.len(), lost: 90, skipped: Vec::new() };
     let picture = Picture { frame: 3, note: "", png: vec![0; 9], size: [4, 3], features: [8, 1] };
     let config = "seed = 0 # <&>\n".into();
-    MethodReport { name, summary: "", trajectory, evaluation, frames, times, pictures: vec![picture], config }
+    MethodReport {
+        name,
+        summary: "",
+        trajectory,
+        evaluation,
+        frames,
+        times,
+        pictures: vec![picture],
+        dense: None,
+        config,
+    }
 }
 
 pub fn report<'a>(

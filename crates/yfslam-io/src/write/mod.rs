@@ -1,5 +1,8 @@
 //! Writes files whole or not at all.
 
+mod nav2;
+mod octomap;
+mod pcd;
 mod ply;
 mod png;
 mod recording;
@@ -10,8 +13,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
-pub use ply::{PlyPoint, write_ply};
-pub use png::{write_color_png, write_depth_png};
+pub use nav2::write_nav2;
+pub use octomap::{OctreeFormat, OctreeSize, OctreeVoxel, write_octomap};
+pub use pcd::write_pcd;
+pub use ply::{PlyPoint, write_ply, write_ply_mesh};
+pub use png::{write_color_png, write_depth_png, write_mask_png};
 pub use recording::{ListedStamps, RecordingWriter};
 
 /// Writes `path` by `write`: into a temporary file beside it that takes its place once all of it is on the disk.

@@ -1,4 +1,4 @@
-//! Point clouds as binary little-endian PLY (G. Turk, Stanford, 1994), which MeshLab, CloudCompare and Open3D read.
+//! Point clouds and meshes as binary little-endian PLY (G. Turk, Stanford, 1994), which MeshLab, CloudCompare and Open3D read.
 
 use std::io;
 use std::path::Path;
@@ -23,14 +23,32 @@ pub fn write_ply<I>(path: &Path, points: I) -> Result<()>
 where
     I: IntoIterator<Item = PlyPoint, IntoIter: ExactSizeIterator>,
 {
-    let points = points.into_iter();
+    write(path, points.into_iter(), &[])
+}
+
+/// Writes a mesh as PLY: coloured vertices, and triangles as numbers of three of them.
+///
+/// # Errors
+/// The file cannot be written, or a position is not finite.
+pub fn write_ply_mesh<I>(path: &Path, vertices: I, triangles: &[[u32; 3]]) -> Result<()>
+where
+    I: IntoIterator<Item = PlyPoint, IntoIter: ExactSizeIterator>,
+{
+    write(path, vertices.into_iter(), triangles)
+}
+
+fn write(path: &Path, points: impl ExactSizeIterator<Item = PlyPoint>, triangles: &[[u32; 3]]) -> Result<()> {
     write_atomically(path, |writer| {
         write!(
             writer,
             "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-             property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+             property uchar red\nproperty uchar green\nproperty uchar blue\n",
             points.len()
         )?;
+        if !triangles.is_empty() {
+            write!(writer, "element face {}\nproperty list uchar int vertex_indices\n", triangles.len())?;
+        }
+        writer.write_all(b"end_header\n")?;
         for PlyPoint { position_m: [x, y, z], color: [r, g, b] } in points {
             if !(x.is_finite() && y.is_finite() && z.is_finite()) {
                 return Err(io::Error::new(io::ErrorKind::InvalidData, format!("point ({x}, {y}, {z}) is not finite")));
@@ -38,6 +56,10 @@ where
             let ([x0, x1, x2, x3], [y0, y1, y2, y3], [z0, z1, z2, z3]) =
                 (x.to_le_bytes(), y.to_le_bytes(), z.to_le_bytes());
             writer.write_all(&[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3, r, g, b])?;
+        }
+        for corners in triangles {
+            writer.write_all(&[3])?;
+            corners.iter().try_for_each(|corner| writer.write_all(&corner.to_le_bytes()))?;
         }
         Ok(())
     })
@@ -64,6 +86,18 @@ mod tests {
         assert_eq!(bytes[header + 4..header + 8], (-2.5f32).to_le_bytes());
         assert_eq!(bytes[header + 12..header + 15], [1, 2, 3]);
         assert_eq!(bytes[bytes.len() - 3..], [255, 0, 7]);
+    }
+
+    #[test]
+    fn triangles_follow_the_vertices() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.ply");
+        let corner = |x: f32| PlyPoint { position_m: [x, 0.0, 1.0], color: [9; 3] };
+        write_ply_mesh(&path, [corner(0.0), corner(1.0), corner(2.0)], &[[0, 2, 1]]).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(text.contains("element face 1\nproperty list uchar int vertex_indices\nend_header\n"), "{text}");
+        assert_eq!(bytes[bytes.len() - 13..], [3, 0, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0]);
     }
 
     #[test]

@@ -25,6 +25,14 @@ pub fn write_depth_png(path: &Path, depth: &Image<u16>) -> Result<()> {
     write_atomically(path, |writer| encode_depth(depth, writer))
 }
 
+/// Writes an 8-bit grey PNG, such as a mask.
+///
+/// # Errors
+/// The file cannot be written, or the image is empty.
+pub fn write_mask_png(path: &Path, mask: &Image<u8>) -> Result<()> {
+    write_atomically(path, |writer| encode_mask(mask, writer))
+}
+
 pub(super) fn encode_color(image: &RgbImage, writer: &mut dyn Write) -> io::Result<()> {
     let kind = (ColorType::Rgb, BitDepth::Eight);
     encode((image.width(), image.height()), kind, image.data().as_flattened(), writer)

@@ -1,14 +1,17 @@
 //! Method `boxes`: whatever is inside a box moves.
 
 use crate::config::DynamicConfig;
-use crate::dynamic::region::{Region, apply};
-use crate::dynamic::{DynamicFilter, Evidence};
+use crate::dynamic::region::apply;
+use crate::dynamic::{DynamicFilter, Evidence, MovingMask, Region};
 use crate::features::FrameFeatures;
+use crate::image::DepthImage;
 
 /// Takes the boxes that are certain enough as they are.
 #[derive(Clone, Debug, Default)]
 pub struct Boxes {
     regions: Vec<Region>,
+    /// Boxes whose features are needed, though they move.
+    given_up: Vec<Region>,
 }
 
 impl DynamicFilter for Boxes {
@@ -16,10 +19,15 @@ impl DynamicFilter for Boxes {
         self.regions.clear();
         let certain = evidence.movable.iter().filter(|d| d.score >= config.open_score);
         self.regions.extend(certain.map(|d| Region { bbox: d.bbox, score: d.score, misses: 0, depth_m: None }));
-        apply(config, &mut self.regions, evidence.depth, features, evidence.sensor);
+        apply(config, &mut self.regions, &mut self.given_up, evidence.depth, features, evidence.sensor);
     }
 
     fn regions(&self) -> &[Region] {
         &self.regions
+    }
+
+    fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
+        let regions = self.regions.iter().chain(&self.given_up).copied().collect();
+        MovingMask { regions, ..MovingMask::default() }
     }
 }

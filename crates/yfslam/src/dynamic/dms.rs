@@ -7,8 +7,9 @@
 use std::collections::VecDeque;
 
 use crate::config::DynamicConfig;
-use crate::dynamic::{DynamicFilter, Evidence, Region};
+use crate::dynamic::{DynamicFilter, Evidence, MovingMask, Region};
 use crate::features::{Descriptor, FrameFeatures};
+use crate::image::DepthImage;
 use crate::sensor::SensorModel;
 
 /// Frames between the two that are compared.
@@ -139,5 +140,9 @@ impl DynamicFilter for Dms {
 
     fn regions(&self) -> &[Region] {
         &[]
+    }
+
+    fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
+        MovingMask::default()
     }
 }

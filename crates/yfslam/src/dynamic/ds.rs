@@ -9,9 +9,10 @@ use rand_pcg::Pcg32;
 use crate::camera::Camera;
 use crate::config::DynamicConfig;
 use crate::dynamic::body_depth::DepthGroups;
+use crate::dynamic::body_mask::BodyMask;
 use crate::dynamic::outline::Outlines;
 use crate::dynamic::tracks::Tracks;
-use crate::dynamic::{DynamicFilter, Evidence, Region};
+use crate::dynamic::{DynamicFilter, Evidence, MovingMask, Region};
 use crate::features::FrameFeatures;
 use crate::geometry::{Pair, epipolar_distance, fundamental_ransac};
 use crate::image::{DepthImage, Flow};
@@ -114,7 +115,8 @@ impl DynamicFilter for Ds {
         &self.regions
     }
 
-    fn moves_at(&self, _depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
-        self.dropped && self.outlines.bodies.covers(raw, edge_px)
+    fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
+        let bodies = if self.dropped { self.outlines.bodies.clone() } else { BodyMask::default() };
+        MovingMask { bodies, ..MovingMask::default() }
     }
 }

@@ -7,7 +7,7 @@ use crate::config::DynamicConfig;
 use crate::dynamic::body_depth::DepthGroups;
 use crate::dynamic::outline::Outlines;
 use crate::dynamic::tracks::Tracks;
-use crate::dynamic::{DynamicFilter, Evidence, FirstPose, Region};
+use crate::dynamic::{DynamicFilter, Evidence, FirstPose, MovingMask, Region};
 use crate::features::FrameFeatures;
 use crate::geometry::Pose;
 use crate::image::DepthImage;
@@ -132,8 +132,9 @@ impl DynamicFilter for Dyna {
         &self.regions
     }
 
-    fn moves_at(&self, _depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
-        self.outlines.bodies.covers(raw, edge_px)
+    fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
+        let bodies = self.outlines.bodies.clone();
+        MovingMask { bodies, ..MovingMask::default() }
     }
 }
 

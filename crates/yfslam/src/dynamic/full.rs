@@ -9,7 +9,7 @@ use crate::dynamic::body_depth::DepthGroups;
 use crate::dynamic::outline::Outlines;
 use crate::dynamic::tracks::Tracks;
 use crate::dynamic::views::Views;
-use crate::dynamic::{DynamicFilter, Evidence, FirstPose, Region, Tie};
+use crate::dynamic::{DynamicFilter, Evidence, FirstPose, MovingMask, Region, Tie};
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
 
@@ -146,8 +146,9 @@ impl DynamicFilter for Full {
         &self.regions
     }
 
-    fn moves_at(&self, _depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
-        self.outlines.bodies.covers(raw, edge_px)
+    fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
+        let bodies = self.outlines.bodies.clone();
+        MovingMask { bodies, ..MovingMask::default() }
     }
 
     fn forget_views(&mut self) {
@@ -201,7 +202,7 @@ mod tests {
             let before = carried(&full);
             full.after_pose(config, &first, &mut features);
             full.end_frame(config, time_ns, (reference, Isometry3::identity()));
-            (before, carried(&full), full.moves_at(&depth, [250.0, 250.0], 0.0))
+            (before, carried(&full), full.outlines.bodies.covers([250.0, 250.0], 0.0))
         };
         let detection = Detection { class: 0, score: 0.9, bbox: BOX };
         for second in 0..3 {

@@ -27,7 +27,7 @@ use crate::geometry::Pose;
 use crate::image::{DepthImage, GrayImage, Image};
 use crate::map::{KeyFrameId, Map};
 use crate::sensor::SensorModel;
-pub use region::Region;
+pub use region::{MovingMask, Region};
 
 /// How moving things are kept out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -113,11 +113,9 @@ pub trait DynamicFilter: Send + Sync {
     /// The boxes in the last frame that were found to hold something that moves.
     fn regions(&self) -> &[Region];
 
-    /// Whether a position of the raw image, px, shows something that moves in the last frame, whose depth is given, or lies within
-    /// `edge_px` of it.
-    fn moves_at(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
-        self.regions().iter().any(|region| region.covers(depth, raw, edge_px))
-    }
+    /// What moves in the last frame, whose depth image is given, pixel by pixel: more than features need, for whoever maps surfaces. What
+    /// was given up for want of features counts, and bodies are outlined where the method has them.
+    fn moving_mask(&self, config: &DynamicConfig, depth: &DepthImage) -> MovingMask;
 
     /// Forgets earlier views: the world begins anew.
     fn forget_views(&mut self) {}

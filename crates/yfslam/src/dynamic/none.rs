@@ -1,8 +1,9 @@
 //! Method `none`: every feature is trusted, as in ORB-SLAM2.
 
 use crate::config::DynamicConfig;
-use crate::dynamic::{DynamicFilter, Evidence, Region};
+use crate::dynamic::{DynamicFilter, Evidence, MovingMask, Region};
 use crate::features::FrameFeatures;
+use crate::image::DepthImage;
 
 /// Leaves the features as they come: trusted.
 #[derive(Clone, Copy, Debug, Default)]
@@ -13,5 +14,9 @@ impl DynamicFilter for NoFilter {
 
     fn regions(&self) -> &[Region] {
         &[]
+    }
+
+    fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
+        MovingMask::default()
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::config::DynamicConfig;
 use crate::detection::BoundingBox;
+use crate::dynamic::body_mask::BodyMask;
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
 use crate::sensor::SensorModel;
@@ -19,15 +20,33 @@ pub struct Region {
     pub depth_m: Option<[f32; 2]>,
 }
 
+/// What moves in a frame, pixel by pixel.
+#[derive(Clone, Debug, Default)]
+pub struct MovingMask {
+    /// Outlines.
+    pub(super) bodies: BodyMask,
+    /// Boxes, whole or at the depth of a body.
+    pub(super) regions: Vec<Region>,
+}
+
+impl MovingMask {
+    /// Whether a position of the raw image, px, shows something that moves, or lies within `edge_px` of it.
+    pub fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
+        self.bodies.covers(raw, edge_px) || self.regions.iter().any(|region| region.covers(depth, raw, edge_px))
+    }
+}
+
 /// Distrusts the features of all regions. If that leaves too few, the regions of least confidence are given up one by one: a false box
-/// must not take the ground from under tracking.
+/// must not take the ground from under tracking. Those go to `given_up`.
 pub fn apply(
     config: &DynamicConfig,
     regions: &mut Vec<Region>,
+    given_up: &mut Vec<Region>,
     depth: &DepthImage,
     features: &mut FrameFeatures,
     sensor: &SensorModel,
 ) {
+    given_up.clear();
     regions.sort_by(|a, b| b.score.total_cmp(&a.score));
     loop {
         let mut trusted = 0;
@@ -36,9 +55,11 @@ pub fn apply(
             f.trust = if moving { 0.0 } else { 1.0 };
             trusted += usize::from(!moving);
         }
-        if trusted >= config.min_trusted.min(features.len()) || regions.pop().is_none() {
+        if trusted >= config.min_trusted.min(features.len()) {
             return;
         }
+        let Some(region) = regions.pop() else { return };
+        given_up.push(region);
     }
 }
 

@@ -5,9 +5,10 @@
 use crate::config::DynamicConfig;
 use crate::detection::BoundingBox;
 use crate::dynamic::body_depth::DepthGroups;
-use crate::dynamic::region::{Region, apply};
+use crate::dynamic::outline::Outlines;
+use crate::dynamic::region::apply;
 use crate::dynamic::tracks::Tracks;
-use crate::dynamic::{DynamicFilter, Evidence};
+use crate::dynamic::{DynamicFilter, Evidence, MovingMask, Region};
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
 
@@ -17,18 +18,20 @@ pub struct Yf {
     tracks: Tracks,
     groups: DepthGroups,
     regions: Vec<Region>,
+    /// Regions whose features are needed, though they move.
+    given_up: Vec<Region>,
 }
 
 impl Yf {
     /// Draws start from `seed`.
     pub fn new(seed: u64) -> Self {
-        Self { tracks: Tracks::default(), groups: DepthGroups::new(seed), regions: Vec::new() }
+        Self { tracks: Tracks::default(), groups: DepthGroups::new(seed), regions: Vec::new(), given_up: Vec::new() }
     }
 
     /// Notes the moving region of each track, and the body's depth in the track. A track that was missed and shows no body at its depth
     /// any more is dropped.
     fn cut_out(&mut self, config: &DynamicConfig, depth: &DepthImage, features: &FrameFeatures) {
-        let Self { tracks, groups, regions } = self;
+        let Self { tracks, groups, regions, .. } = self;
         tracks.list.retain_mut(|track| {
             let Some(center_m) = groups.body_of(config, track, depth, features) else {
                 // No valid depth: whatever is in a box that was just detected moves; an old box is given up.
@@ -59,11 +62,19 @@ impl DynamicFilter for Yf {
         let depths = self.groups.depths_of(config, movable, depth, features);
         self.tracks.update(config, config.max_misses, movable, depths, [depth.raw.width(), depth.raw.height()]);
         self.cut_out(config, depth, features);
-        apply(config, &mut self.regions, depth, features, sensor);
+        apply(config, &mut self.regions, &mut self.given_up, depth, features, sensor);
     }
 
     fn regions(&self) -> &[Region] {
         &self.regions
+    }
+
+    fn moving_mask(&self, config: &DynamicConfig, depth: &DepthImage) -> MovingMask {
+        let mut outlines = Outlines::default();
+        outlines.bodies.begin(depth);
+        outlines.outline(config, &mut self.groups.clone(), &mut self.tracks.clone(), 0.0);
+        let regions = self.regions.iter().chain(&self.given_up).copied().collect();
+        MovingMask { bodies: outlines.bodies, regions }
     }
 }
 

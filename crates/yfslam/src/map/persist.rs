@@ -1,11 +1,7 @@
-//! Maps as bytes: a header that says what follows, then the keyframes and landmarks.
+//! Maps as bytes: the keyframes and landmarks, packed.
 //!
-//! ```text
-//! "yfslam map" · version u16 · length of the rest u64 · CRC-32 of the rest u32 │ zstd(postcard(records))
-//! ```
-//!
-//! Numbers of the header are little-endian. The records hold what cannot be computed: search grids, observation lists and covisibility
-//! are made anew. In: a map and the camera and feature settings it was made with. Out: bytes, and back. Nothing here touches files.
+//! The records hold what cannot be computed: search grids, observation lists and covisibility are made anew. In: a map and the camera and
+//! feature settings it was made with. Out: bytes, and back. Nothing here touches files.
 
 use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -16,50 +12,15 @@ use crate::config::{Config, FeatureConfig};
 use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds, OrbExtractor};
 use crate::geometry::Pose;
 use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::packed::Kind;
 
-/// First bytes of every map.
-const MAGIC: &[u8; 10] = b"yfslam map";
 /// Version that this code writes, and the only one it reads.
 pub const VERSION: u16 = 1;
-/// Bytes of the header.
-const HEADER: usize = MAGIC.len() + 2 + 8 + 4;
+/// What the bytes of every map begin with.
+const KIND: Kind = Kind { magic: "yfslam map", version: VERSION };
 
 /// Why bytes are no map that can be used.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum MapError {
-    /// The bytes begin like no map.
-    #[error("this is no yfslam map: it does not begin with \"yfslam map\"")]
-    Foreign,
-    /// Another version of the format.
-    #[error(
-        "the map has version {found} of the format, this program reads version {VERSION}: use the program that wrote it, or map anew"
-    )]
-    Version {
-        /// The version found.
-        found: u16,
-    },
-    /// Bytes are missing, or there are more than the header announces.
-    #[error(
-        "the map is {found} bytes long, its header announces {announced}: it was cut or appended to; use another copy"
-    )]
-    Length {
-        /// Bytes found.
-        found: u64,
-        /// Bytes announced.
-        announced: u64,
-    },
-    /// The bytes were altered.
-    #[error("the map's checksum is {found:08x}, its header says {announced:08x}: it was altered; use another copy")]
-    Checksum {
-        /// Checksum of the bytes.
-        found: u32,
-        /// Checksum in the header.
-        announced: u32,
-    },
-    /// The records contradict each other, or themselves.
-    #[error("the map's records are wrong: {0}")]
-    Records(String),
-}
+pub use crate::packed::PackedError as MapError;
 
 /// A map with what it was made with.
 #[derive(Clone, Debug)]
@@ -83,7 +44,7 @@ struct Records {
 
 /// A camera without optional fields, as a format that does not name its fields needs it.
 #[derive(Serialize, Deserialize)]
-struct CameraRecord {
+pub(crate) struct CameraRecord {
     size: [u32; 2],
     intrinsics: [f64; 4],
     distortion: [f64; 5],
@@ -131,16 +92,7 @@ struct LandmarkRecord {
 /// # Errors
 /// If the records cannot be written, which would be a fault of this program.
 pub fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Vec<u8>, MapError> {
-    let records = Records::of(map, camera, features);
-    let plain = postcard::to_allocvec(&records).map_err(|error| MapError::Records(error.to_string()))?;
-    let packed = ruzstd::encoding::compress_to_vec(plain.as_slice(), ruzstd::encoding::CompressionLevel::Fastest);
-    let mut bytes = Vec::with_capacity(HEADER + packed.len());
-    bytes.extend_from_slice(MAGIC);
-    bytes.extend_from_slice(&VERSION.to_le_bytes());
-    bytes.extend_from_slice(&(packed.len() as u64).to_le_bytes());
-    bytes.extend_from_slice(&crc32fast::hash(&packed).to_le_bytes());
-    bytes.extend_from_slice(&packed);
-    Ok(bytes)
+    KIND.pack(&Records::of(map, camera, features))
 }
 
 /// The map in `bytes`, checked.
@@ -148,29 +100,7 @@ pub fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Ve
 /// # Errors
 /// If the bytes are no map, of another version, cut, altered, or contradict themselves.
 pub fn decode(bytes: &[u8]) -> Result<SavedMap, MapError> {
-    let rest = bytes.strip_prefix(MAGIC).ok_or(MapError::Foreign)?;
-    let cut = || MapError::Length { found: bytes.len() as u64, announced: HEADER as u64 };
-    let (version, rest) = rest.split_first_chunk::<2>().ok_or_else(cut)?;
-    let found = u16::from_le_bytes(*version);
-    if found != VERSION {
-        return Err(MapError::Version { found });
-    }
-    let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(cut)?;
-    let (checksum, packed) = rest.split_first_chunk::<4>().ok_or_else(cut)?;
-    let (length, announced) = (u64::from_le_bytes(*length), u32::from_le_bytes(*checksum));
-    if packed.len() as u64 != length {
-        let announced = length.saturating_add(HEADER as u64);
-        return Err(MapError::Length { found: bytes.len() as u64, announced });
-    }
-    let found = crc32fast::hash(packed);
-    if found != announced {
-        return Err(MapError::Checksum { found, announced });
-    }
-    let wrong = |error: &dyn std::fmt::Display| MapError::Records(error.to_string());
-    let mut plain = Vec::new();
-    let mut decoder = ruzstd::decoding::StreamingDecoder::new(packed).map_err(|e| wrong(&e))?;
-    std::io::Read::read_to_end(&mut decoder, &mut plain).map_err(|e| wrong(&e))?;
-    let records: Records = postcard::from_bytes(&plain).map_err(|e| wrong(&e))?;
+    let records: Records = KIND.unpack(bytes)?;
     records.into_map().map_err(MapError::Records)
 }
 
@@ -318,7 +248,7 @@ impl FeatureRecord {
 }
 
 impl CameraRecord {
-    fn of(camera: &Camera) -> Self {
+    pub fn of(camera: &Camera) -> Self {
         Self {
             size: [camera.width as u32, camera.height as u32],
             intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy],
@@ -329,19 +259,19 @@ impl CameraRecord {
         }
     }
 
-    fn into_camera(self) -> Camera {
+    pub fn into_camera(self) -> Camera {
         let ([width, height], [fx, fy, cx, cy]) = (self.size.map(|s| s as usize), self.intrinsics);
         let Self { distortion, depth_factor, fps, bf, .. } = self;
         Camera { width, height, fx, fy, cx, cy, distortion, depth_factor, fps, bf }
     }
 }
 
-fn pose_record(pose: &Pose) -> [f64; 7] {
+pub(crate) fn pose_record(pose: &Pose) -> [f64; 7] {
     let (t, q) = (pose.translation.vector, pose.rotation.coords);
     [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
 }
 
-fn pose_of([x, y, z, i, j, k, w]: &[f64; 7]) -> Option<Pose> {
+pub(crate) fn pose_of([x, y, z, i, j, k, w]: &[f64; 7]) -> Option<Pose> {
     let quaternion = Quaternion::new(*w, *i, *j, *k);
     let good = Vector3::new(*x, *y, *z).iter().all(|c| c.is_finite()) && (quaternion.norm() - 1.0).abs() < 1e-6;
     // The bits are kept as they are: a map read back is the map that was written.
@@ -446,10 +376,10 @@ mod tests {
     #[test]
     fn errors_say_what_is_wrong_with_the_bytes() {
         let bytes = encode(&map(), &camera(), &FeatureConfig::default()).unwrap();
-        assert_eq!(decode(b"PK\x03\x04").unwrap_err(), MapError::Foreign);
+        assert_eq!(decode(b"PK\x03\x04").unwrap_err(), MapError::Foreign(KIND.magic));
         let mut newer = bytes.clone();
-        newer[MAGIC.len()] = 9;
-        assert_eq!(decode(&newer).unwrap_err(), MapError::Version { found: 9 });
+        newer[KIND.magic.len()] = 9;
+        assert_eq!(decode(&newer).unwrap_err(), MapError::Version { magic: KIND.magic, found: 9, version: VERSION });
         let announced = bytes.len() as u64;
         assert_eq!(decode(&bytes[..100]).unwrap_err(), MapError::Length { found: 100, announced });
     }

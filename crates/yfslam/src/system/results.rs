@@ -2,8 +2,9 @@
 
 use super::Slam;
 use crate::detection::Detection;
-use crate::dynamic::Region;
+use crate::dynamic::{MovingMask, Region};
 use crate::geometry::Pose;
+use crate::image::DepthImage;
 use crate::loops::LoopClosed;
 use crate::map::persist::{MapError, encode};
 use crate::map::{KeyFrameId, Map};
@@ -80,6 +81,11 @@ impl Slam {
     /// The parts of the last frame that were found to move.
     pub fn moving_regions(&self) -> &[Region] {
         self.filter.regions()
+    }
+
+    /// What moves in the last frame, whose depth image is given, pixel by pixel.
+    pub fn moving_mask(&self, depth: &DepthImage) -> MovingMask {
+        self.filter.moving_mask(&self.config.dynamic, depth)
     }
 
     /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.

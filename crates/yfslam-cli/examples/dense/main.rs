@@ -1,0 +1,92 @@
+//! What dense maps are worth, by the exact world, for each method side by side.
+//!
+//! ```text
+//! cargo run --release -p yfslam-cli --example dense -- 'walking_xyz?frames=300' --methods none,yf,full
+//! ```
+#![allow(clippy::print_stdout, reason = "tables are what this program is for")]
+
+mod judge;
+mod survey;
+mod view;
+
+use anyhow::Result;
+use clap::Parser;
+use judge::{Truth, survey_of_exact_poses};
+use survey::{Taken, take};
+use yfslam::dense::{DenseConfig, up};
+use yfslam::dynamic::Method;
+use yfslam_eval::{Table, TableStyle};
+use yfslam_synth::{World, parse};
+
+#[derive(Parser)]
+struct Arguments {
+    /// Worlds, such as `walking_xyz?seed=2&frames=300`.
+    worlds: Vec<String>,
+    /// Methods that keep moving things out.
+    #[arg(long, value_delimiter = ',', default_value = "none,boxes,yf,full")]
+    methods: Vec<String>,
+    /// Close no loops.
+    #[arg(long)]
+    no_loops: bool,
+    /// Depth beyond which readings make no surface, m.
+    #[arg(long, default_value_t = DenseConfig::default().max_range_m)]
+    max_range: f32,
+    /// Side of a voxel, m.
+    #[arg(long, default_value_t = 0.05)]
+    resolution: f32,
+}
+
+fn main() -> Result<()> {
+    let arguments = Arguments::parse();
+    let config =
+        DenseConfig { resolution_m: arguments.resolution, max_range_m: arguments.max_range, ..Default::default() };
+    let mut table = Table::new([
+        "world",
+        "method",
+        "pieces",
+        "occupied",
+        "of exact poses",
+        "precision",
+        "recall",
+        "ghosts",
+        "filled",
+        "valid",
+        "PSNR (dB)",
+        "of filled",
+        "ms a keyframe",
+        "MB",
+    ]);
+    for spec in &arguments.worlds {
+        let mut world = parse(spec)?;
+        world.detections = true;
+        let config_of_world = world.clone();
+        let world = World::new(&world)?;
+        for name in &arguments.methods {
+            let method: Method = serde_json::from_value(serde_json::Value::String(name.clone()))?;
+            let Taken { survey, each_ms, bytes } = take(&world, method, &config, !arguments.no_loops)?;
+            let volume = survey.volume(&config, &up::of_survey(&survey), |_| {});
+            let found = Truth::of(&survey, &volume, &world).judge(&volume);
+            let exact = survey_of_exact_poses(&survey, &world).volume(&config, &up::of_survey(&survey), |_| {});
+            let exact = exact.voxels().filter(|known| known.occupied).count();
+            let views = view::judge(&survey, &volume, &config_of_world)?;
+            table.push([
+                spec.clone(),
+                name.clone(),
+                survey.pieces.len().to_string(),
+                found.occupied.to_string(),
+                format!("{:.3}", found.occupied as f64 / exact.max(1) as f64),
+                format!("{:.4}", found.precision),
+                format!("{:.4}", found.recall),
+                format!("{:.5}", found.ghosts),
+                format!("{:.3}", views.filled),
+                format!("{:.3}", views.valid),
+                format!("{:.1}", views.psnr_db),
+                format!("{:.1}", views.filled_psnr_db),
+                format!("{each_ms:.1}"),
+                format!("{:.0}", bytes as f64 / 1e6),
+            ]);
+        }
+    }
+    print!("{}", table.render(TableStyle::Plain));
+    Ok(())
+}

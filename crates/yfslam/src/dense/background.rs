@@ -1,0 +1,237 @@
+//! The view without people: colour and depth of what they hide, from other keyframes.
+//!
+//! In: a survey with its volume, and a view. Out: its picture, with the pixels that nobody has seen left out. DynaSLAM (IEEE RA-L 2018,
+//! section III-E) projects earlier frames into the view. Here depth is projected, and colour looked up at that depth in the frames that
+//! are nearest: it stays sharp, and one of them that still shows somebody is outvoted.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::dense::piece::{CellGrid, Piece};
+use crate::dense::voxels::voxel_at;
+use crate::dense::{Survey, Volume};
+use crate::geometry::Pose;
+use crate::image::{Image, RgbImage};
+
+/// Frames that are asked for a colour at most, nearest first.
+const SOURCES: usize = 30;
+/// Colours of which the median is taken at most.
+const VOTES: usize = 7;
+/// Difference in depth up to which a frame sees the same surface, as a share of it, and m at least.
+const SAME_SHARE: f32 = 0.04;
+const SAME_M: f32 = 0.04;
+
+/// Every so many cells light is compared, and so many must be seen by both.
+const LIGHT_STEP: usize = 37;
+const LIGHT_CELLS: usize = 50;
+
+/// A view without what moves.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Background {
+    /// Colour, black where it is not known.
+    pub color: RgbImage,
+    /// Depth, m; 0 where it is not known.
+    pub depth_m: Image<f32>,
+    /// Whether the colour is known.
+    pub valid: Image<bool>,
+}
+
+/// A piece that is asked.
+struct Source {
+    /// How far its view is from the one wanted.
+    apart: f64,
+    number: usize,
+    t_view_source: Isometry3<f32>,
+    /// What its colours are multiplied by: exposure changes from frame to frame.
+    gain: Vector3<f32>,
+}
+
+impl Source {
+    /// The colour that it has for a point of the view.
+    fn look(&self, survey: &Survey, point: &Point3<f32>) -> Option<Vector3<f32>> {
+        let one = survey.pieces.get(self.number)?;
+        let p = self.t_view_source.inverse_transform_point(point);
+        look(&survey.grid, &one.piece, survey.grid.project(&p)?, p.z)
+    }
+
+    /// Brings its light to that of the view's own piece, by what both see.
+    fn match_light(&mut self, survey: &Survey, grid: &CellGrid, own: &Piece) {
+        let (mut ours, mut theirs, mut count) = (Vector3::zeros(), Vector3::zeros(), 0);
+        for (cell, [x, y]) in grid.rays().iter().enumerate().step_by(LIGHT_STEP) {
+            let Some(z) = own.surface_m(cell) else { continue };
+            if let Some(color) = self.look(survey, &Point3::new(x * z, y * z, z)) {
+                ours += Vector3::from(own.color(cell).map(f32::from));
+                theirs += color;
+                count += 1;
+            }
+        }
+        if count >= LIGHT_CELLS {
+            self.gain = ours.zip_map(&theirs, |ours, theirs| (ours / theirs.max(1.0)).clamp(0.5, 2.0));
+        }
+    }
+}
+
+/// The view from `t_world_cam` on the cells of `grid`. Of the view's `own` piece, on the same cells, what does not move is kept; piece
+/// number `except` is not asked.
+pub fn background(
+    survey: &Survey,
+    volume: &Volume,
+    grid: &CellGrid,
+    t_world_cam: &Pose,
+    own: Option<&Piece>,
+    except: Option<usize>,
+) -> Background {
+    let mut sources: Vec<Source> = Vec::new();
+    for (number, one) in survey.pieces.iter().enumerate().filter(|(number, _)| Some(*number) != except) {
+        let t_view_source = t_world_cam.inverse() * one.t_world_cam;
+        let apart = t_view_source.translation.vector.norm() + 2.0 * t_view_source.rotation.angle();
+        sources.push(Source { apart, number, t_view_source: t_view_source.cast(), gain: Vector3::repeat(1.0) });
+    }
+    sources.sort_by(|a, b| a.apart.total_cmp(&b.apart));
+    if let Some(own) = own {
+        sources.iter_mut().take(SOURCES).for_each(|source| source.match_light(survey, grid, own));
+    }
+    let mut depth_m = projected_depth(survey, volume, grid, &sources);
+    let mut color = RgbImage::new(grid.columns(), grid.rows());
+    let mut valid = Image::new(grid.columns(), grid.rows());
+    for (cell, (z, &[x, y])) in depth_m.iter_mut().zip(grid.rays()).enumerate() {
+        let kept = own.filter(|own| !own.moves(cell));
+        if let Some(own_m) = kept.and_then(|own| own.surface_m(cell)) {
+            *z = own_m;
+        }
+        let known = match kept {
+            Some(own) => Some(own.color(cell)),
+            None if *z > 0.0 => vote(survey, &sources, &Point3::new(x * *z, y * *z, *z)),
+            None => None,
+        };
+        if let Some(known) = known {
+            color.data_mut()[cell] = known;
+            valid.data_mut()[cell] = true;
+        }
+    }
+    let depth_m = Image::from_vec(grid.columns(), grid.rows(), depth_m).unwrap_or_default();
+    Background { color, depth_m, valid }
+}
+
+/// Depth of the nearest static surface in each cell, m; 0 where there is none. Of what is in its range, only
+/// what the volume has as occupied counts.
+fn projected_depth(survey: &Survey, volume: &Volume, grid: &CellGrid, sources: &[Source]) -> Vec<f32> {
+    let config = volume.config();
+    let per_m = 1.0 / config.resolution_m;
+    let (columns, rows) = (grid.columns() as i32, grid.rows() as i32);
+    let mut depth_m = vec![0.0f32; grid.columns() * grid.rows()];
+    for Source { number, t_view_source, .. } in sources {
+        let (Some(one), Some(pose)) = (survey.pieces.get(*number), volume.pose(*number)) else { continue };
+        let pose: Isometry3<f32> = pose.cast();
+        for (p, _) in one.piece.points(&survey.grid, f32::INFINITY) {
+            let seen = t_view_source * p;
+            let Some([column, row]) = grid.project(&seen) else { continue };
+            // Far away the volume says nothing.
+            if p.z <= config.max_range_m && !volume.is_occupied(voxel_at(&(pose * p), per_m)) {
+                continue;
+            }
+            // A cell of the source covers this many of the view.
+            let scale = p.z / seen.z * survey.grid.stride_px() as f32 / grid.stride_px() as f32;
+            let reach = (0.5 * scale + 0.6).clamp(0.6, 4.0);
+            let range =
+                |at: f32, end: i32| ((at - reach).ceil().max(0.0) as i32, ((at + reach).floor() as i32).min(end - 1));
+            let ((left, right), (top, bottom)) = (range(column, columns), range(row, rows));
+            for r in top..=bottom {
+                for c in left..=right {
+                    let nearest = &mut depth_m[(r * columns + c) as usize];
+                    if *nearest == 0.0 || seen.z < *nearest {
+                        *nearest = seen.z;
+                    }
+                }
+            }
+        }
+    }
+    depth_m
+}
+
+/// Median colour that the nearest sources give a point of the view, channel by channel.
+fn vote(survey: &Survey, sources: &[Source], point: &Point3<f32>) -> Option<[u8; 3]> {
+    let mut votes: Vec<[u8; 3]> = Vec::with_capacity(VOTES);
+    for source in sources.iter().take(SOURCES) {
+        let color = source.look(survey, point).map(|color| color.component_mul(&source.gain));
+        votes.extend(color.map(|color| color.data.0[0].map(|v| (v + 0.5) as u8)));
+        if votes.len() == VOTES {
+            break;
+        }
+    }
+    if votes.is_empty() {
+        return None;
+    }
+    Some([0, 1, 2].map(|channel| {
+        votes.sort_unstable_by_key(|rgb| rgb[channel]);
+        votes[votes.len() / 2][channel]
+    }))
+}
+
+/// The colour of a piece at a position, between its cells; `None` if another surface or something that moves is there.
+fn look(grid: &CellGrid, piece: &Piece, [column, row]: [f32; 2], z: f32) -> Option<Vector3<f32>> {
+    let (left, top) = (column.floor(), row.floor());
+    let (dx, dy) = (column - left, row - top);
+    let (mut sum, mut weights, mut same) = (Vector3::<f32>::zeros(), 0.0, false);
+    for (x, y, weight) in [
+        (0.0, 0.0, (1.0 - dx) * (1.0 - dy)),
+        (1.0, 0.0, dx * (1.0 - dy)),
+        (0.0, 1.0, (1.0 - dx) * dy),
+        (1.0, 1.0, dx * dy),
+    ] {
+        let (c, r) = (left + x, top + y);
+        if c < 0.0 || r < 0.0 || c >= grid.columns() as f32 || r >= grid.rows() as f32 {
+            continue;
+        }
+        let cell = r as usize * grid.columns() + c as usize;
+        if piece.moves(cell) {
+            return None;
+        }
+        match piece.surface_m(cell) {
+            Some(depth) if (depth - z).abs() > SAME_M + SAME_SHARE * z => return None,
+            Some(_) => same = true,
+            None => {}
+        }
+        sum += Vector3::from(piece.color(cell).map(f32::from)) * weight;
+        weights += weight;
+    }
+    (same && weights > 0.0).then(|| sum / weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::dense::{DenseConfig, SurveyPiece, scene};
+
+    #[test]
+    fn a_person_is_replaced_by_the_wall_that_another_view_shows() {
+        let config = DenseConfig::default();
+        let grid = CellGrid::new(&scene::camera(), config.stride_px);
+        let moved = Pose::translation(0.4, 0.0, 0.0);
+        // The other view paints the wall in stripes of its world.
+        let mut other = scene::wall(&grid, 3.0, None);
+        let stripe = |x: f32| if (x * 2.0).floor() as i32 % 2 == 0 { [200, 40, 40] } else { [40, 200, 40] };
+        for (cell, [x, _]) in grid.rays().iter().enumerate() {
+            other.color[cell] = stripe(x * 3.0 + 0.4 + 100.0);
+        }
+        let mut own = scene::wall(&grid, 3.0, Some(1.0));
+        own.depth.iter_mut().filter(|d| **d < 3000).for_each(|d| *d |= 1 << 15);
+        let pieces = [(Pose::identity(), own.clone()), (moved, other)];
+        let pieces = pieces.map(|(t_world_cam, piece)| SurveyPiece { timestamp_ns: 0, t_world_cam, piece });
+        let survey = Survey { pieces: pieces.into(), grid: grid.clone() };
+        let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let seen = background(&survey, &volume, &grid, &Pose::identity(), Some(&own), Some(0));
+        assert!(seen.valid.data().iter().all(|valid| *valid), "everything is known");
+        let mut filled = 0;
+        for cell in (0..own.depth.len()).filter(|cell| own.moves(*cell)) {
+            assert!((seen.depth_m.data()[cell] - 3.0).abs() < 0.01);
+            let x = grid.rays()[cell][0] * 3.0 + 100.0;
+            if ((x * 2.0).fract() - 0.5).abs() < 0.4 {
+                assert_eq!(seen.color.data()[cell], stripe(x), "{x}");
+            }
+            filled += 1;
+        }
+        assert!(filled > 100);
+    }
+}

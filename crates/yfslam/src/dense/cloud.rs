@@ -1,0 +1,112 @@
+//! A coloured point cloud: one point for each occupied voxel.
+//!
+//! In: a survey and its volume. Out: the mean of the readings in each occupied voxel, those without enough occupied neighbours left out.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Point3};
+
+use crate::dense::voxels::{Block, VOXELS, Voxel, block_of, place_of, voxel_at, voxel_in};
+use crate::dense::{Survey, Volume};
+
+/// A point of a cloud.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CloudPoint {
+    /// The voxel that it stands for.
+    pub voxel: Voxel,
+    /// Where it is, m, in the frame of the volume.
+    pub position_m: [f32; 3],
+    /// Red, green, blue.
+    pub color: [u8; 3],
+}
+
+/// Sums over the readings in a voxel: offsets from its block in voxels, colour, count.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    offset: [f32; 3],
+    color: [u32; 3],
+    count: u32,
+}
+
+/// The cloud of a survey, ordered by block, then by place in it. `told` hears how many pieces are done.
+pub fn cloud(survey: &Survey, volume: &Volume, mut told: impl FnMut(usize)) -> Vec<CloudPoint> {
+    let config = volume.config();
+    let per_m = 1.0 / config.resolution_m;
+    let mut sums: BTreeMap<Block, Vec<Sum>> = BTreeMap::new();
+    for (number, one) in survey.pieces.iter().enumerate() {
+        told(number);
+        let Some(pose) = volume.pose(number) else { continue };
+        let pose: Isometry3<f32> = pose.cast();
+        for (p, color) in one.piece.points(&survey.grid, config.max_range_m) {
+            let p = pose * p;
+            let voxel = voxel_at(&p, per_m);
+            let block = block_of(voxel);
+            let sums = sums.entry(block).or_insert_with(|| vec![Sum::default(); VOXELS]);
+            sums[place_of(voxel)].add(&p, per_m, voxel, color);
+        }
+    }
+    let mut points = Vec::new();
+    for (block, sums) in &sums {
+        for (place, sum) in sums.iter().enumerate().filter(|(_, sum)| sum.count > 0) {
+            let voxel = voxel_in(*block, place);
+            if volume.is_occupied(voxel) && neighbours(volume, voxel) >= config.min_neighbours {
+                points.push(sum.mean(voxel, config.resolution_m));
+            }
+        }
+    }
+    points
+}
+
+/// Occupied voxels among the 26 around one.
+pub fn neighbours(volume: &Volume, [x, y, z]: Voxel) -> usize {
+    let around = (0..27).filter(|i| *i != 13).map(|i| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]);
+    around.filter(|voxel| volume.is_occupied(*voxel)).count()
+}
+
+impl Sum {
+    fn add(&mut self, p: &Point3<f32>, per_m: f32, voxel: Voxel, color: [u8; 3]) {
+        for axis in 0..3 {
+            self.offset[axis] += p[axis] * per_m - voxel[axis] as f32;
+            self.color[axis] += u32::from(color[axis]);
+        }
+        self.count += 1;
+    }
+
+    fn mean(&self, voxel: Voxel, resolution_m: f32) -> CloudPoint {
+        let count = self.count as f32;
+        CloudPoint {
+            voxel,
+            position_m: [0, 1, 2].map(|axis| (voxel[axis] as f32 + self.offset[axis] / count) * resolution_m),
+            color: self.color.map(|sum| ((sum + self.count / 2) / self.count) as u8),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+    use crate::dense::piece::CellGrid;
+    use crate::dense::{DenseConfig, SurveyPiece, scene};
+    use crate::geometry::Pose;
+
+    #[test]
+    fn a_cloud_has_one_point_a_voxel_on_the_surface_with_its_colour() {
+        let config = DenseConfig::default();
+        let grid = CellGrid::new(&scene::camera(), config.stride_px);
+        let piece = scene::wall(&grid, 2.01, None);
+        let piece = SurveyPiece { timestamp_ns: 0, t_world_cam: Pose::identity(), piece };
+        let survey = Survey { pieces: vec![piece], grid };
+        let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let points = cloud(&survey, &volume, |_| {});
+        assert!(points.iter().all(|p| (p.position_m[2] - 2.01).abs() < 1e-3 && p.color == [120, 130, 140]));
+        let mut voxels: Vec<_> = points.iter().map(|p| p.voxel).collect();
+        voxels.sort_unstable();
+        voxels.dedup();
+        assert_eq!(voxels.len(), points.len());
+        let (width, height) = (2.01 * 159.0 / 134.0, 2.01 * 119.0 / 134.0);
+        let expected = width * height / 0.0025;
+        assert!((points.len() as f32 - expected).abs() < 0.1 * expected, "{} of {expected}", points.len());
+    }
+}

@@ -1,0 +1,84 @@
+//! Maps that people use: occupancy, clouds, grids, meshes, and the view without people.
+//!
+//! ```text
+//! frame ─► piece ──hangs on its keyframe──► mapper ─► volume      occupied, free, unknown; follows every correction
+//!          depth and colour without          │
+//!          edges; what moves is marked       └──► survey ─► cloud, grid, mesh, background
+//! ```
+//!
+//! Nothing that moves makes a surface: the dynamic filter's decision is cut into the piece. What it missed is taken back by the views
+//! that come after and see through it.
+
+pub mod background;
+pub mod cloud;
+mod config;
+pub mod grid;
+mod mapper;
+pub mod mesh;
+pub mod persist;
+pub mod piece;
+#[cfg(test)]
+mod scene;
+mod trace;
+pub mod up;
+mod volume;
+pub mod voxels;
+
+pub use config::DenseConfig;
+pub use mapper::DenseMapper;
+pub use piece::{CellGrid, Piece};
+pub use volume::{KnownVoxel, Volume};
+
+use nalgebra::UnitQuaternion;
+
+use crate::config::ConfigError;
+use crate::geometry::Pose;
+
+/// Why no dense map can be made.
+#[derive(Debug, thiserror::Error)]
+pub enum DenseError {
+    /// A value of the configuration with which nothing can work.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A thread could not be started.
+    #[error("the thread of the dense map could not be started: {0}; raise the limit of threads of this user")]
+    Thread(#[from] std::io::Error),
+}
+
+/// Pieces in their places: what all products are made of.
+#[derive(Clone, Debug)]
+pub struct Survey {
+    /// The cells of the pieces.
+    pub grid: CellGrid,
+    /// In the order of time.
+    pub pieces: Vec<SurveyPiece>,
+}
+
+/// A piece in its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurveyPiece {
+    /// Time of the frame, ns.
+    pub timestamp_ns: i64,
+    /// World from camera.
+    pub t_world_cam: Pose,
+    /// Depth and colour.
+    pub piece: Piece,
+}
+
+impl Survey {
+    /// Bytes of memory that the pieces take.
+    pub fn bytes(&self) -> usize {
+        self.pieces.len() * self.grid.rays().len() * Piece::BYTES_PER_CELL
+    }
+
+    /// The volume of all pieces in a world turned by `turn`. `told` hears how many pieces are done.
+    pub fn volume(&self, config: &DenseConfig, turn: &UnitQuaternion<f64>, mut told: impl FnMut(usize)) -> Volume {
+        let mut volume = Volume::new(config);
+        for (number, one) in self.pieces.iter().enumerate() {
+            told(number);
+            volume.place(number, &self.grid, &one.piece, Some(&(turn * one.t_world_cam)));
+        }
+        volume.settle();
+        volume
+    }
+}

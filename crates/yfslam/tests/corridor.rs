@@ -1,0 +1,63 @@
+//! A corridor of 100 m, mapped at 5 cm, fits into 300 MB.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use yfslam::Camera;
+use yfslam::dense::voxels::voxel_at;
+use yfslam::dense::{CellGrid, DenseConfig, Piece, Survey, SurveyPiece, Volume};
+
+/// Half the width of the corridor, and how far floor and ceiling are from the camera, m.
+const WALL_M: f32 = 1.2;
+const FLOOR_M: f32 = 1.35;
+/// Way from piece to piece, m: a robot of 0.4 m/s makes one each half second.
+const STEP_M: f32 = 0.2;
+
+/// The depth of a cell of a camera that looks along the corridor, turned by `angle` about its vertical axis; the sensor sees 8 m.
+fn depth_m([x, y]: [f32; 2], angle: f32) -> f32 {
+    let (sin, cos) = angle.sin_cos();
+    let aside = (cos * x + sin).abs();
+    let z = (WALL_M / aside.max(1e-3)).min(FLOOR_M / y.abs().max(1e-3));
+    if z < 8.0 { z } else { 0.0 }
+}
+
+#[test]
+fn a_corridor_of_100_m_fits_into_300_mb() {
+    let camera = Camera {
+        width: 640,
+        height: 480,
+        fx: 535.4,
+        fy: 539.2,
+        cx: 320.1,
+        cy: 247.6,
+        distortion: [0.0; 5],
+        depth_factor: 5000.0,
+        fps: 30.0,
+        bf: 40.0,
+    };
+    let config = DenseConfig::default();
+    let grid = CellGrid::new(&camera, config.stride_px);
+    // The camera looks ahead, a little to the left, a little to the right, in turn.
+    let angle = |k: usize| [0.0, 0.35, 0.0, -0.35][k % 4];
+    let piece = |k: usize| SurveyPiece {
+        timestamp_ns: k as i64,
+        t_world_cam: Isometry3::new(
+            Vector3::new(0.0, 0.0, f64::from(STEP_M) * k as f64),
+            Vector3::y() * f64::from(angle(k)),
+        ),
+        piece: Piece::of_depths(grid.rays().iter().map(|ray| depth_m(*ray, angle(k))), [128; 3]),
+    };
+    let survey = Survey { pieces: (0..(100.0 / STEP_M) as usize).map(piece).collect(), grid: grid.clone() };
+    let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
+    let megabytes = |bytes: usize| bytes as f64 / 1e6;
+    let (pieces, voxels) = (megabytes(survey.bytes()), megabytes(volume.bytes()));
+    println!("{} keyframes: pieces {pieces:.0} MB, volume {voxels:.0} MB", survey.pieces.len());
+    assert!(pieces + voxels < 300.0, "{pieces} MB and {voxels} MB");
+    let announced = megabytes(Volume::bytes_at_most(&config, &survey));
+    assert!(voxels <= announced, "{voxels} MB, announced {announced} MB");
+    // It is the corridor: walls on both sides and free in the middle, all along it.
+    for k in 0..90 {
+        let at = |x: f32| voxel_at(&[x, 0.3, 3.0 + k as f32].into(), 20.0);
+        assert!(volume.is_occupied(at(WALL_M)) || volume.is_occupied(at(WALL_M - 0.05)), "{k} m: the right wall");
+        assert!(volume.is_occupied(at(-WALL_M)) || volume.is_occupied(at(-WALL_M - 0.05)), "{k} m: the left wall");
+        assert!(volume.get(at(0.0)).is_some_and(|known| !known.occupied), "{k} m: the middle");
+    }
+}
