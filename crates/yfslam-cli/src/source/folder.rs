@@ -36,15 +36,12 @@ pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
     let masks = args.masks.as_deref().map(|folder| Masks::open(folder, &sequence, &camera.camera)).transpose()?;
     let tally = masks.as_ref().map(|masks| masks.tally.clone());
     let stream = FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?;
+    let known = FolderKnowledge { boxes, mirror: sequence.mirror, masks };
     let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();
     Ok(Source {
         name: name(args),
         camera,
-        frames: Frames::new(
-            Player::Folder(stream, FolderKnowledge { boxes, mirror: sequence.mirror, masks }),
-            args,
-            &stamps_ns,
-        ),
+        frames: Frames::new(Player::Folder(stream, Box::new(known)), args, &stamps_ns),
         stamps_ns,
         association: Some(sequence.report),
         masks: tally,

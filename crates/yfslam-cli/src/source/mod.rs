@@ -110,7 +110,7 @@ pub struct Frames {
 /// What frames are made of.
 enum Player {
     /// Files.
-    Folder(FrameStream, FolderKnowledge),
+    Folder(FrameStream, Box<FolderKnowledge>),
     /// A world.
     Synth(Renderer),
 }
