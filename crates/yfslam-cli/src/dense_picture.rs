@@ -60,7 +60,7 @@ pub fn from_above(points: &[CloudPoint], resolution_m: f32, cut_m: f32, [width, 
     for p in shown() {
         let [x, y, z] = p.position_m;
         let at = [width as f32 / 2.0 - (y - middle.y) * scale, height as f32 / 2.0 - (x - middle.x) * scale];
-        canvas.square(at, resolution_m * scale, -z, shaded(p, low.z, high.z));
+        canvas.square(at, 1.3 * resolution_m * scale, -z, shaded(p, low.z, high.z));
     }
     canvas.image
 }
