@@ -156,7 +156,7 @@ fn the_same_run_twice_leaves_the_same_report_apart_from_its_times() {
         let folder = tempfile::tempdir().unwrap();
         succeeds(folder.path(), &args);
         let (_, page) = page(&folder.path().join("out"));
-        assert_same_figures(&page, "yf", &report(&folder.path().join("out")));
+        assert_same_figures(&page, "full", &report(&folder.path().join("out")));
         assert!(!page.untimed.contains("processor core") && page.text.contains("processor core"));
         page.untimed
     };
