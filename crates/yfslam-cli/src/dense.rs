@@ -124,10 +124,9 @@ pub fn write(folder: &Path, survey: &Survey) -> Result<()> {
 ///
 /// # Errors
 /// A picture is too large for PNG.
-pub fn pictures(survey: &Survey) -> Result<DenseMap> {
-    let config = DenseConfig::default();
+pub fn pictures(config: &DenseConfig, survey: &Survey) -> Result<DenseMap> {
     let turn = up::of_survey(survey);
-    let volume = survey.volume(&config, &turn, |_| {});
+    let volume = survey.volume(config, &turn, |_| {});
     let points = cloud(survey, &volume, |_| {});
     let cut_m = up::floor_m(survey, &turn).unwrap_or_default() as f32 + SHOWN_M;
     let above = from_above(&points, config.resolution_m, cut_m, PICTURE_PX);

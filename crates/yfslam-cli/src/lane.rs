@@ -3,7 +3,6 @@
 //! In: frames, which several lanes may share. Out: a [`Judged`] run, its files written.
 
 use anyhow::Result;
-use yfslam::dense::DenseConfig;
 use yfslam::tracking::TrackingState;
 use yfslam::{Config, RgbdFrame, Slam};
 use yfslam_eval::report::{DenseMap, Picture};
@@ -96,7 +95,7 @@ impl Lane {
         let pipeline = Pipeline::new(slam, times);
         let dense = extras
             .dense
-            .then(|| DenseRun::new(&DenseConfig::default(), &source.camera.camera, extras.map.execution()))
+            .then(|| DenseRun::new(&config.dense, &source.camera.camera, extras.map.execution()))
             .transpose()?;
         Ok(Self { config, folder, pipeline, overlay, moments, dense, state: TrackingState::default(), failure: None })
     }
@@ -163,7 +162,7 @@ impl Lane {
             dense::write(folder.path(), survey)?;
         }
         let shown = survey.filter(|_| moments.is_some());
-        let dense = shown.map(|survey| dense::pictures(&survey)).transpose()?;
+        let dense = shown.map(|survey| dense::pictures(&config.dense, &survey)).transpose()?;
         let pictures = moments.map_or(Ok(Vec::new()), |moments| moments.to_pictures())?;
         let boxes = if needs_boxes { judge_by.boxes } else { &BoxOrigin::None };
         Ok(Judged { config, folder, outcome, boxes, shared, evaluation, pictures, dense, dense_cost })

@@ -3,12 +3,14 @@
 //! Each section is declared once by `config_section!`: the doc comment, the type and the default of a key stand together, and
 //! [`Config::to_commented_toml`] prints the same words as comments.
 
+mod dense;
 mod validate;
 
 use serde::{Deserialize, Serialize};
 
 use crate::dynamic::Method;
 use crate::dynamic::depth_group::Grouping;
+pub use dense::DenseConfig;
 pub use validate::ConfigError;
 
 /// Field names and doc comments of a configuration section.
@@ -397,6 +399,8 @@ config_section! {
         bundle: BundleConfig = BundleConfig::default(),
         /// Pose-graph optimisation.
         pose_graph: PoseGraphConfig = PoseGraphConfig::default(),
+        /// Dense maps.
+        dense: DenseConfig = DenseConfig::default(),
     }
 }
 
@@ -413,6 +417,7 @@ const SECTIONS: &[(&str, &str, FieldDocs)] = &[
     ("pose", PoseOptimizerConfig::ABOUT, PoseOptimizerConfig::FIELDS),
     ("bundle", BundleConfig::ABOUT, BundleConfig::FIELDS),
     ("pose_graph", PoseGraphConfig::ABOUT, PoseGraphConfig::FIELDS),
+    ("dense", DenseConfig::ABOUT, DenseConfig::FIELDS),
 ];
 
 impl Config {
@@ -480,6 +485,7 @@ mod tests {
             ("[features]\nlevels = 0", "features.levels"),
             ("[depth]\ncorner_sigma_px = 0.0", "depth.corner_sigma_px"),
             ("[dynamic]\nopen_score = 30.0", "dynamic.open_score"),
+            ("[dense]\nresolution_m = 0.0", "dense.resolution_m"),
         ] {
             let error = Config::from_toml(text).unwrap().validate().unwrap_err();
             assert_eq!(error.key, key);

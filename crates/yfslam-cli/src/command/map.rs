@@ -22,6 +22,7 @@ use crate::cpu;
 use crate::dense::DENSE_FILE;
 use crate::dense_picture::{SHOWN_M, from_above, from_corner};
 use crate::progress::Progress;
+use crate::settings::SettingsArgs;
 use crate::terminal::Terminal;
 
 const EXAMPLES: &str = "\
@@ -71,12 +72,15 @@ pub struct DenseMapArgs {
     /// What some keyframes saw, with the people painted over by what is behind them.
     #[arg(long, help_heading = "Products")]
     background: bool,
-    /// Side of a voxel, m, from 0.01 to 0.2.
-    #[arg(long, value_name = "M", default_value_t = DenseConfig::default().resolution_m, help_heading = "Map")]
-    resolution: f32,
-    /// Depth beyond which readings make no surface, m.
-    #[arg(long, value_name = "M", default_value_t = DenseConfig::default().max_range_m, help_heading = "Map")]
-    max_range: f32,
+    /// Side of a voxel, m, from 0.01 to 0.2 [default: 0.05].
+    #[arg(long, value_name = "M", help_heading = "Map")]
+    resolution: Option<f32>,
+    /// Depth beyond which readings make no surface, m [default: 4].
+    #[arg(long, value_name = "M", help_heading = "Map")]
+    max_range: Option<f32>,
+    /// Settings that differ from the defaults, in the section `dense`; `yfslam config` prints them all.
+    #[arg(long, value_name = "FILE.toml", help_heading = "Map")]
+    config: Option<PathBuf>,
     /// Which way is up: `level` (as floors, tables and ceilings say), `camera` (upright in the first picture), or a direction X,Y,Z of
     /// the run's world.
     #[arg(long, value_name = "UP", default_value = "level", allow_hyphen_values = true, help_heading = "Map")]
@@ -144,8 +148,7 @@ struct Maker<'a> {
 }
 
 pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
-    let config = DenseConfig { resolution_m: args.resolution, max_range_m: args.max_range, ..Default::default() };
-    config.validate()?;
+    let config = args.config()?;
     let (survey, folder) = args.open()?;
     terminal.note(&format!("{} pieces; {}", survey.pieces.len(), memory_bound(&config, &survey)));
     let turn = args.turn(&survey);
@@ -177,6 +180,16 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
 }
 
 impl DenseMapArgs {
+    /// The constants: flags win over the file, the file over the defaults.
+    fn config(&self) -> Result<DenseConfig> {
+        let file = SettingsArgs { config: self.config.clone(), ..SettingsArgs::default() };
+        let mut config = file.resolve()?.dense;
+        config.resolution_m = self.resolution.unwrap_or(config.resolution_m);
+        config.max_range_m = self.max_range.unwrap_or(config.max_range_m);
+        config.validate()?;
+        Ok(config)
+    }
+
     /// The survey, and the folder for its products.
     fn open(&self) -> Result<(Survey, PathBuf)> {
         let file = if self.run.is_dir() { self.run.join(DENSE_FILE) } else { self.run.clone() };

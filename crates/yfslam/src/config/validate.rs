@@ -94,7 +94,7 @@ impl Config {
         ];
         match checks.into_iter().find(|(.., holds, _)| !holds) {
             Some((key, value, _, must)) => Err(ConfigError { key, value, must }),
-            None => Ok(()),
+            None => self.dense.validate(),
         }
     }
 }

@@ -11,7 +11,6 @@
 
 pub mod background;
 pub mod cloud;
-mod config;
 pub mod grid;
 mod mapper;
 pub mod mesh;
@@ -24,7 +23,7 @@ pub mod up;
 mod volume;
 pub mod voxels;
 
-pub use config::DenseConfig;
+pub use crate::config::DenseConfig;
 pub use mapper::DenseMapper;
 pub use piece::{CellGrid, Piece};
 pub use volume::{KnownVoxel, Volume};

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, FieldDocs, config_section};
+use super::{ConfigError, FieldDocs, config_section};
 
 config_section! {
-    /// Dense maps.
+    /// Dense maps (`yfslam run --dense`, `yfslam map`).
     DenseConfig {
         /// Side of a voxel, m, from 0.01 to 0.2. Source: DS-SLAM.
         resolution_m: f32 = 0.05,
