@@ -1,5 +1,5 @@
 //! Bars and lines of the report are as high as the errors they stand for: read back from the page by the labels of their axes.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "a test may")]
 
 #[path = "common/drawing.rs"]
 mod drawing;

@@ -1,6 +1,6 @@
 //! The page of any input: long, lost, far off, without truth.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
 

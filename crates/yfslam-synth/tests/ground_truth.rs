@@ -1,5 +1,5 @@
 //! What the synthetic world claims about itself, checked from outside: geometry, masks, boxes, repeatability.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "a test may")]
 
 use nalgebra::Point3;
 use yfslam::Camera;

@@ -48,6 +48,11 @@ fn recorded(args: &SourceArgs) -> Result<String> {
         Ok(camera) => describe_camera(&mut text, camera)?,
         Err(error) => writeln!(text, "camera        not usable: {}", explain(error))?,
     }
+    if let Ok(camera) = &camera
+        && let Some(masks) = args.mask_tally(&sequence, &camera.camera)?
+    {
+        writeln!(text, "masks         {} of {} frames have one", masks.found, masks.found + masks.missing)?;
+    }
     match sequence.groundtruth_path() {
         Some(path) => truth(&mut text, &path, &sequence)?,
         None => writeln!(text, "ground truth  none (groundtruth.txt)")?,

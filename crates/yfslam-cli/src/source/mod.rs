@@ -165,6 +165,15 @@ fn usable(Delivery { frame, has_stamp }: Delivery) -> Result<RgbdFrame, Skip> {
 }
 
 impl SourceArgs {
+    /// Which frames of a recording have a mask, where masks were asked for.
+    ///
+    /// # Errors
+    /// There is none, or the first cannot be used.
+    pub fn mask_tally(&self, sequence: &yfslam_io::Sequence, camera: &yfslam::Camera) -> Result<Option<MaskTally>> {
+        let masks = self.masks.as_deref().map(|folder| Masks::open(folder, sequence, camera)).transpose()?;
+        Ok(masks.map(|masks| masks.tally))
+    }
+
     /// All of a sequence, forward, with its own camera.
     pub fn new(sequence: String) -> Self {
         Self {

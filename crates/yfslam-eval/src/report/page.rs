@@ -15,11 +15,26 @@ use super::{MethodReport, Picture, Report, tables};
 use crate::improvement_percent;
 
 /// The style sheet of all pages.
-pub const STYLE: &str = include_str!("style.css");
+const STYLE: &str = include_str!("style.css");
 
 /// The whole page.
 pub fn page(report: &Report) -> Markup {
     let scene = Scene::new(report);
+    let content = html! {
+        (header(report))
+        (accuracy(report, &scene))
+        (trajectory(&scene))
+        (errors(report, &scene))
+        (pictures(report))
+        (dense(report))
+        (times(report))
+        (setup(report))
+    };
+    shell(report.sequence, report.version, &content)
+}
+
+/// What every page has around its content.
+pub fn shell(title: &str, version: &str, content: &Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -27,21 +42,12 @@ pub fn page(report: &Report) -> Markup {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                title { (report.sequence) " – yfslam" }
+                title { (title) " – yfslam" }
                 style { (PreEscaped(ink::style())) (PreEscaped(STYLE)) }
             }
             body {
-                main {
-                    (header(report))
-                    (accuracy(report, &scene))
-                    (trajectory(&scene))
-                    (errors(report, &scene))
-                    (pictures(report))
-                    (dense(report))
-                    (times(report))
-                    (setup(report))
-                }
-                footer { "yfslam " (report.version) }
+                main { (content) }
+                footer { "yfslam " (version) }
             }
         }
     }
@@ -120,6 +126,8 @@ fn accuracy(report: &Report, scene: &Scene) -> Markup {
             }
         };
     }
+    // A table of many methods needs the width of the page.
+    let beside = report.methods.len() <= 3;
     html! {
         section #accuracy {
             h2 { "Accuracy" }
@@ -131,7 +139,7 @@ fn accuracy(report: &Report, scene: &Scene) -> Markup {
                  standard deviation."
                 @if report.methods.len() > 1 { " Improvement is (1 − error / error of the first) · 100 %." }
             }
-            div.pair.accuracy {
+            div.pair.accuracy[beside].wide[!beside] {
                 (tables::errors(report))
                 @if let Some(bars) = bars(report, scene) { (figure(scene, &bars, false)) }
             }

@@ -1,9 +1,9 @@
 //! In: tables with their titles. Out: one HTML page of them that needs nothing but itself, in the style of a run's report.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
-use super::ink::{self, Ink};
-use super::page::STYLE;
+use super::ink::Ink;
+use super::page::shell;
 use crate::Table;
 
 /// Word with which the last cell of a row begins whose figures were taken from a paper.
@@ -44,33 +44,18 @@ pub struct TableSection {
 impl TablesPage<'_> {
     /// The page.
     pub fn html(&self) -> String {
-        let markup = html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta name="color-scheme" content="light dark";
-                    title { (self.title) " – yfslam" }
-                    style { (PreEscaped(ink::style())) (PreEscaped(STYLE)) }
-                }
-                body {
-                    main {
-                        header {
-                            p.eyebrow { "yfslam" }
-                            h1 { (self.title) }
-                            dl.facts {
-                                @for (name, value) in &self.facts { div { dt { (name) } dd { (value) } } }
-                            }
-                        }
-                        @for section in self.sections { (show(section)) }
-                        section #setup { h2 { "Repeat it" } pre.command { (self.command) } }
-                    }
-                    footer { "yfslam " (self.version) }
+        let content = html! {
+            header {
+                p.eyebrow { "yfslam" }
+                h1 { (self.title) }
+                dl.facts {
+                    @for (name, value) in &self.facts { div { dt { (name) } dd { (value) } } }
                 }
             }
+            @for section in self.sections { (show(section)) }
+            section #setup { h2 { "Repeat it" } pre.command { (self.command) } }
         };
-        markup.into_string()
+        shell(self.title, self.version, &content).into_string()
     }
 }
 
