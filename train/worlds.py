@@ -3,7 +3,7 @@
     python -m train.worlds OUT --count 250 --program target/release/yfslam
 
 Every setting is drawn from a generator seeded with the recording's number, so the same command writes the same pictures. Frames lie
-more than a second apart; one recording in five has no people. Recordings that are there already are kept.
+more than a second apart. Recordings that are there already are kept.
 """
 
 import argparse
@@ -13,9 +13,9 @@ import subprocess
 import numpy as np
 
 
-def spec(number, rng):
-    """The text that names a world."""
-    people = 0 if rng.random() < 0.2 else int(rng.integers(1, 6))
+def spec(number, rng, empty, share):
+    """The text that names a world: `empty` of all have no people, else people cover `share` (least, most) of the picture."""
+    people = 0 if rng.random() < empty else int(rng.integers(1, 6))
     keys = {
         "seed": number + 1,
         "scene": rng.choice(["office", "rescue", "corridor", "lab"]),
@@ -23,7 +23,7 @@ def spec(number, rng):
         "activity": rng.choice(["sitting", "walking", "walking", "crowd"]),
         "people": people,
         "robots": int(rng.integers(1, min(3, 7 - people))) if rng.random() < 0.3 else 0,
-        "share": round(rng.uniform(0.1, 0.6), 2),
+        "share": round(rng.uniform(*share), 2),
         "exposure": round(float(np.exp(rng.uniform(-0.6, 0.5))), 2),
         "flicker": round(rng.uniform(0, 0.5), 2) if rng.random() < 0.3 else 0,
         "width": 480, "height": 360, "fps": 0.7, "frames": 6,
@@ -38,12 +38,14 @@ def main():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--count", type=int, default=250)
     parser.add_argument("--first", type=int, default=0, help="number of the first recording")
+    parser.add_argument("--empty", type=float, default=0.2, help="share of recordings without people")
+    parser.add_argument("--share", type=float, nargs=2, default=[0.1, 0.6], help="part of the picture that people cover, least and most")
     parser.add_argument("--program", default="yfslam")
     options = parser.parse_args()
     for number in range(options.first, options.first + options.count):
         folder = options.out / f"{number:04}"
         if not (folder / "boxes.json").exists():
-            world = spec(number, np.random.default_rng([17, number]))
+            world = spec(number, np.random.default_rng([17, number]), options.empty, options.share)
             done = subprocess.run([options.program, "synth", world, "--out", folder, "--force"], capture_output=True, text=True)
             if done.returncode:
                 print(f"left out: {done.stderr.strip().splitlines()[-1]}")

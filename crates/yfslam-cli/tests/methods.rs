@@ -67,6 +67,19 @@ fn a_detector_that_looks_at_every_third_frame_does_so_for_one_method_and_for_sev
 }
 
 #[test]
+fn a_detector_that_looks_once_in_three_seconds_is_enough_to_follow_walkers() {
+    let folder = tempfile::tempdir().unwrap();
+    for (world, limit_m) in [("walking_xyz", 0.02), ("walking_static", 0.02)] {
+        let spec = format!("synth:{world}?width=320&height=240&fps=15&frames=45");
+        succeeds(folder.path(), &["run", &spec, "--detect-every", "45", "--out", world, "-q"]);
+        let report = report(&folder.path().join(world));
+        assert_eq!(report["frames"]["tracked"], 45, "{world}");
+        // Without the tracks that follow bodies it is .1 to .3 m.
+        assert!(ate_rmse(&report) < limit_m, "{world}: {}", ate_rmse(&report));
+    }
+}
+
+#[test]
 fn a_recording_without_boxes_is_looked_at_by_the_network_in_the_program() {
     let folder = tempfile::tempdir().unwrap();
     record(&folder.path().join("seq"));

@@ -318,8 +318,14 @@ config_section! {
         view_thing_step_m: f32 = 0.66,
         /// Distance from the body within which a corner sees its outline, px at the finest level.
         edge_px: f32 = 3.0,
-        /// Frames over which a track is carried without a box.
+        /// Frames over which a track is carried without a box, of those in which a detector looked.
         max_misses: usize = 30,
+        /// How far a body that is carried can be from its last depth before it is somebody else, m.
+        max_jump_m: f32 = 0.2,
+        /// Share of its former size at which a body that is carried is seen whole, and its box follows it.
+        whole_share: f32 = 0.9,
+        /// Share of its box that shows something nearer when a body is hidden, not gone.
+        hidden_share: f32 = 0.5,
     }
 }
 

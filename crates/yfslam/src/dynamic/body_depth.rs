@@ -101,7 +101,7 @@ impl DepthGroups {
     /// The depth group of a track's body. A track that knows its depth is looked for there first.
     fn body(&mut self, config: &DynamicConfig, track: &Track) -> Option<DepthGroup> {
         if let Some(z) = track.depth_m {
-            let reach = config.group_half_width_m + config.max_depth_step_m * (1 + track.misses) as f32;
+            let reach = config.group_half_width_m + config.max_depth_step_m * track.depth_age.max(1) as f32;
             let near = within(&self.pixel_depths, z - reach, z + reach);
             let group = largest_exact(near, 2.0 * config.group_half_width_m);
             if group.is_some_and(|g| self.is_body(config, &g)) {

@@ -31,6 +31,15 @@ pub struct BodyMask {
     body: Vec<Reached>,
 }
 
+/// Place and size of a body in the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Extent {
+    /// Its middle, px.
+    pub middle: [f32; 2],
+    /// Cells that it fills.
+    pub cells: usize,
+}
+
 /// A cell of a body, or of a gap in it.
 #[derive(Clone, Copy, Debug)]
 struct Reached {
@@ -68,7 +77,8 @@ impl BodyMask {
 
     /// Marks the body of a track, whose middle is `center_m` away: the cells of the box at that depth, and those in the box grown by `config.margin`
     /// to which the surface leads on without a step, over gaps without depth too. Of the gaps, those in the box are marked.
-    pub fn grow(&mut self, config: &DynamicConfig, track: usize, bbox: &BoundingBox, center_m: f32) {
+    /// Returns what was marked.
+    pub fn grow(&mut self, config: &DynamicConfig, track: usize, bbox: &BoundingBox, center_m: f32) -> Extent {
         let owner = owner(track);
         let (inner, outer) = (self.cells(bbox, 0.0), self.cells(bbox, config.margin));
         let [near, far] = [center_m - config.group_half_width_m, center_m + config.group_half_width_m];
@@ -117,6 +127,19 @@ impl BodyMask {
                 }
             }
         }
+        self.extent()
+    }
+
+    /// Place and size of the body that was outlined last.
+    fn extent(&self) -> Extent {
+        let (mut column, mut row) = (0, 0);
+        for reached in &self.body {
+            column += reached.cell as usize % self.columns;
+            row += reached.cell as usize / self.columns;
+        }
+        let cells = self.body.len();
+        let middle = |sum: usize| (sum * CELL_PX) as f32 / cells.max(1) as f32;
+        Extent { middle: [middle(column), middle(row)], cells }
     }
 
     /// Marks the cells whose middle a mask of movable objects covers.
@@ -129,6 +152,14 @@ impl BodyMask {
                 }
             }
         }
+    }
+
+    /// Share of a box that shows something nearer than `depth_m`.
+    pub fn share_nearer(&self, bbox: &BoundingBox, depth_m: f32) -> f32 {
+        let [left, top, right, bottom] = self.cells(bbox, 0.0);
+        let row = |row: usize| self.depth_m[row * self.columns..].iter().take(right).skip(left);
+        let nearer = (top..bottom).flat_map(row).filter(|z| **z > 0.0 && **z < depth_m).count();
+        nearer as f32 / (bottom.saturating_sub(top) * right.saturating_sub(left)).max(1) as f32
     }
 
     /// Whether a box shows something that moves.

@@ -99,7 +99,12 @@ impl DynamicFilter for Full {
         let max_misses = self.max_misses(config);
         self.compared = false;
         let depths = self.groups.depths_of(config, movable, depth, features);
-        self.tracks.update(config, max_misses, movable, depths, [depth.raw.width(), depth.raw.height()]);
+        let size = [depth.raw.width(), depth.raw.height()];
+        if evidence.looked {
+            self.tracks.update(config, max_misses, movable, depths, size);
+        } else {
+            self.tracks.carry(size);
+        }
         self.outlines.begin(evidence);
         self.outlines.outline(config, &mut self.groups, &mut self.tracks, 0.0);
         self.regions.clear();
@@ -170,12 +175,12 @@ mod tests {
 
     const BOX: BoundingBox = BoundingBox { x_min: 200.0, y_min: 100.0, x_max: 300.0, y_max: 400.0 };
 
-    /// A wall 2.4 m away, in front of which somebody may stand where the box is.
+    /// A wall 2.4 m away, with somebody close in front of it, perhaps, where the box is.
     fn room(somebody: bool) -> DepthImage {
         let mut raw = Image::new(640, 480);
         raw.data_mut().fill(12_000u16);
         if somebody {
-            (100..400).for_each(|y| raw.row_mut(y)[200..300].fill(10_000));
+            (100..400).for_each(|y| raw.row_mut(y)[200..300].fill(11_250));
         }
         DepthImage { raw, metres_per_unit: 1.0 / 5000.0 }
     }
@@ -196,7 +201,8 @@ mod tests {
         let mut features = FrameFeatures::default();
         let mut show = |time_ns: i64, somebody: bool, boxes: &[Detection]| {
             let (depth, gray) = (room(somebody), Image::new(640, 480));
-            let evidence = Evidence { movable: boxes, mask: None, gray: &gray, depth: &depth, sensor: &sensor };
+            let evidence =
+                Evidence { movable: boxes, looked: true, mask: None, gray: &gray, depth: &depth, sensor: &sensor };
             full.before_pose(config, &evidence, &mut features);
             let carried = |full: &Full| full.tracks.list.iter().filter(|track| !track.ended).count();
             let before = carried(&full);

@@ -54,6 +54,8 @@ pub enum Method {
 pub struct Evidence<'a> {
     /// Boxes of movable objects, at any score.
     pub movable: &'a [Detection],
+    /// Whether somebody looked for such boxes in this frame: without a look, no box tells nothing.
+    pub looked: bool,
     /// Pixels of movable objects, where somebody knows them.
     pub mask: Option<&'a Image<u8>>,
     /// The picture.

@@ -27,38 +27,63 @@ impl Outlines {
     }
 
     /// Outlines the bodies of all tracks of at least this score, the nearest first: who is hidden behind somebody is sought in what that
-    /// one leaves free. A track that was missed and shows no body is dropped.
+    /// one leaves free.
     pub fn outline(&mut self, config: &DynamicConfig, groups: &mut DepthGroups, tracks: &mut Tracks, min_score: f32) {
         self.waiting.clear();
         self.waiting
             .extend((0..tracks.list.len()).filter(|&t| !tracks.list[t].ended && tracks.list[t].score >= min_score));
-        while !self.waiting.is_empty() {
-            let mut next: Option<(f32, f32, usize)> = None;
-            let bodies = &mut self.bodies;
-            self.waiting.retain(|&t| {
-                let track = &mut tracks.list[t];
-                let Some((center_m, share)) = groups.body_in(config, track, bodies) else {
-                    track.ended = track.misses > 0;
-                    if track.misses == 0 && !bodies.holds_body(&track.bbox) {
-                        // No valid depth: whatever is in a box that was just detected moves.
-                        bodies.fill(t, &track.bbox);
-                    }
-                    return false;
-                };
-                // Of two at like depth the one who fills more of the box.
-                let nearer = next.is_none_or(|(z, s, _)| {
-                    center_m < z - config.group_half_width_m || (center_m < z + config.group_half_width_m && share > s)
-                });
-                if nearer {
-                    next = Some((center_m, share, t));
-                }
-                true
-            });
-            let Some((center_m, _, t)) = next else { break };
+        while let Some((t, center_m)) = self.nearest(config, groups, tracks) {
             self.waiting.retain(|&w| w != t);
             let track = &mut tracks.list[t];
             track.depth_m = Some(center_m);
-            self.bodies.grow(config, t, &track.bbox, center_m);
+            let body = self.bodies.grow(config, t, &track.bbox, center_m);
+            track.note_body(config, &body);
+        }
+    }
+
+    /// The nearest body of the tracks that wait, and its depth, m. Tracks that show none cease to wait.
+    fn nearest(
+        &mut self,
+        config: &DynamicConfig,
+        groups: &mut DepthGroups,
+        tracks: &mut Tracks,
+    ) -> Option<(usize, f32)> {
+        let (mut nearest, mut i): (Option<(f32, f32, usize)>, usize) = (None, 0);
+        while let Some(&t) = self.waiting.get(i) {
+            let track = &tracks.list[t];
+            let body = groups.body_in(config, track, &self.bodies);
+            let Some((center_m, share)) = body.filter(|(center_m, _)| track.can_be_at(config, *center_m)) else {
+                self.waiting.remove(i);
+                self.miss(config, tracks, t, body.map(|(center_m, _)| center_m));
+                continue;
+            };
+            // Of two at like depth the one who fills more of the box.
+            let is_nearer = nearest.is_none_or(|(z, s, _)| {
+                center_m < z - config.group_half_width_m || (center_m < z + config.group_half_width_m && share > s)
+            });
+            if is_nearer {
+                nearest = Some((center_m, share, t));
+            }
+            i += 1;
+        }
+        nearest.map(|(center_m, _, t)| (t, center_m))
+    }
+
+    /// What becomes of a track whose body is not where it should be; `instead_m` is the depth of what is there, m.
+    fn miss(&mut self, config: &DynamicConfig, tracks: &mut Tracks, t: usize, instead_m: Option<f32>) {
+        let track = &mut tracks.list[t];
+        if track.misses == 0 {
+            if !self.bodies.holds_body(&track.bbox) {
+                // No valid depth: whatever is in a box that was just detected moves.
+                self.bodies.fill(t, &track.bbox);
+            }
+            return;
+        }
+        let in_front_m = track.depth_m.unwrap_or(0.0) - config.group_half_width_m;
+        track.ended = self.bodies.share_nearer(&track.bbox, in_front_m) < config.full.hidden_share;
+        if let Some(in_front) = track.hide(instead_m) {
+            self.waiting.push(tracks.list.len());
+            tracks.list.push(in_front);
         }
     }
 

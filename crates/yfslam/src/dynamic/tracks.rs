@@ -1,11 +1,12 @@
 //! Boxes over time: a detector that blinks must not let a person in.
 //!
-//! In: the boxes of a frame. Out: tracks, opened at a high score, kept at a low one, and carried over misses with the box's own velocity
-//! (Dynamic-VINS, section on missed detections).
+//! In: the boxes of a frame, then the outlines of the bodies in them. Out: tracks, opened at a high score, kept at a low one, and carried
+//! over misses with the box's own velocity (Dynamic-VINS, section on missed detections) or, where a body is outlined, with the body.
 
 use crate::config::DynamicConfig;
 use crate::detection::{BoundingBox, Detection};
 use crate::dynamic::Region;
+use crate::dynamic::body_mask::Extent;
 
 /// A movable object followed in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,10 +19,18 @@ pub struct Track {
     pub misses: usize,
     /// Depth of the body when last seen, m.
     pub depth_m: Option<f32>,
+    /// Frames since it was detected or, by a method that outlines bodies, outlined there.
+    pub depth_age: usize,
     /// Whether it was found to show nothing; the next update drops it.
     pub ended: bool,
+    /// Frames since its last detection in which a detector looked.
+    missed_looks: usize,
     /// Motion of the box's centre, px per frame.
     velocity: [f32; 2],
+    /// The body when it was last seen whole; its middle is counted from that of the box.
+    body: Extent,
+    /// Whether somebody is in front of it.
+    hidden: bool,
 }
 
 /// All tracks, in the order in which they were opened.
@@ -46,18 +55,16 @@ impl Tracks {
         depths_m: &[Option<f32>],
         [width, height]: [usize; 2],
     ) {
-        self.list.retain(|track| !track.ended);
-        for track in &mut self.list {
-            track.misses += 1;
-            track.bbox = shifted(&track.bbox, track.velocity);
-        }
+        self.carry([width, height]);
+        self.list.iter_mut().for_each(|track| track.missed_looks += 1);
         // Pairs of track and detection by descending overlap; indices break ties.
         self.pairs.clear();
         for (t, track) in self.list.iter().enumerate() {
             for (d, (detection, depth_m)) in detections.iter().zip(depths_m).enumerate() {
                 let iou = track.bbox.iou(&detection.bbox);
                 let gap_m = track.depth_m.zip(*depth_m).map_or(0.0, |(a, b)| (a - b).abs());
-                let same_body = gap_m <= config.track_max_depth_gap_m + config.max_depth_step_m * track.misses as f32;
+                let same_body =
+                    gap_m <= config.track_max_depth_gap_m + config.max_depth_step_m * track.depth_age as f32;
                 if iou >= config.track_min_iou && detection.score >= config.keep_score && same_body {
                     self.pairs.push((iou, t, d));
                 }
@@ -82,13 +89,27 @@ impl Tracks {
                     score: detection.score,
                     misses: 0,
                     depth_m: None,
+                    depth_age: 0,
                     ended: false,
+                    missed_looks: 0,
                     velocity: [0.0; 2],
+                    body: Extent::default(),
+                    hidden: false,
                 });
             }
         }
+        self.list.retain(|track| track.missed_looks <= max_misses);
+    }
+
+    /// Takes a frame in for which nobody looked for boxes: tracks are carried on, however long that lasts.
+    pub fn carry(&mut self, [width, height]: [usize; 2]) {
         let image = BoundingBox { x_min: 0.0, y_min: 0.0, x_max: width as f32, y_max: height as f32 };
-        self.list.retain(|t| t.misses <= max_misses && t.bbox.iou(&image) > 0.0);
+        for track in &mut self.list {
+            track.misses += 1;
+            track.depth_age += 1;
+            track.bbox = shifted(&track.bbox, track.velocity);
+        }
+        self.list.retain(|track| !track.ended && track.bbox.iou(&image) > 0.0);
     }
 }
 
@@ -97,6 +118,39 @@ impl Track {
     pub fn region(&self, config: &DynamicConfig) -> Region {
         let depth_m = self.depth_m.map(|z| [z - config.group_half_width_m, z + config.group_half_width_m]);
         Region { bbox: self.bbox, score: self.score, misses: self.misses, depth_m }
+    }
+
+    /// Whether a body that fills its box at this depth, m, can be its own: without a box to say so, bodies do not jump.
+    pub fn can_be_at(&self, config: &DynamicConfig, center_m: f32) -> bool {
+        self.misses == 0 || self.depth_m.is_none_or(|z| (center_m - z).abs() <= config.full.max_jump_m)
+    }
+
+    /// Hides it behind what appeared in its box at this depth, m. Returns a track of that, if it is nearer and came just now: whoever hides
+    /// a body that is followed moves too, though no detector may have seen him yet.
+    pub fn hide(&mut self, center_m: Option<f32>) -> Option<Track> {
+        let nearer = center_m.filter(|z| !self.hidden && self.depth_m.is_some_and(|own| *z < own))?;
+        let in_front = Track { depth_m: Some(nearer), ended: false, ..*self };
+        self.hidden = true;
+        Some(in_front)
+    }
+
+    /// Learns which part of the box the body fills. Without a detection the box follows the body, as long as that is seen whole.
+    pub fn note_body(&mut self, config: &DynamicConfig, body: &Extent) {
+        self.hidden = false;
+        self.depth_age = 0;
+        let [x, y] = center(&self.bbox);
+        let offset = [body.middle[0] - x, body.middle[1] - y];
+        let is_whole = body.cells as f32 >= config.full.whole_share * self.body.cells as f32;
+        if self.misses == 0 {
+            self.body = Extent { middle: offset, cells: body.cells };
+        } else if is_whole {
+            let error = [offset[0] - self.body.middle[0], offset[1] - self.body.middle[1]];
+            self.bbox = shifted(&self.bbox, error);
+            for (velocity, error) in self.velocity.iter_mut().zip(error) {
+                *velocity += 0.5 * error;
+            }
+            self.body.cells = body.cells;
+        }
     }
 
     fn follow(&mut self, detection: &Detection) {
@@ -108,6 +162,8 @@ impl Track {
         self.bbox = detection.bbox;
         self.score = detection.score;
         self.misses = 0;
+        self.depth_age = 0;
+        self.missed_looks = 0;
     }
 }
 
@@ -165,5 +221,49 @@ mod tests {
         tracks.update(&config, 10, &[detection(50.0, 0.5)], &[None], [640, 480]);
         tracks.update(&config, 10, &[detection(52.0, 0.15)], &[None], [640, 480]);
         assert_eq!((tracks.list.len(), tracks.list[0].misses), (1, 0));
+    }
+
+    /// The tracks after ten frames in which somebody 2 m away walked by 8 px a frame, his body outlined.
+    fn walker(config: &DynamicConfig) -> Tracks {
+        let mut tracks = Tracks::default();
+        for i in 0..10 {
+            tracks.update(config, 10, &[detection(50.0 + 8.0 * i as f32, 0.8)], &[Some(2.0)], [640, 480]);
+            tracks.list[0].depth_m = Some(2.0);
+            tracks.list[0].note_body(config, &Extent { middle: [105.0 + 8.0 * i as f32, 240.0], cells: 1000 });
+        }
+        tracks
+    }
+
+    #[test]
+    fn while_nobody_looks_a_box_follows_its_body() {
+        let config = DynamicConfig::default();
+        let mut tracks = walker(&config);
+        for i in 0..90 {
+            tracks.carry([640, 480]);
+            // He turns round at once, and is hidden in part for a while: then the box keeps its pace.
+            let cells = if (40..50).contains(&i) { 500 } else { 1000 };
+            let middle = [177.0 - i as f32, if cells == 500 { 100.0 } else { 240.0 }];
+            tracks.list[0].note_body(&config, &Extent { middle, cells });
+        }
+        let [x, y] = center(&tracks.list[0].bbox);
+        assert!((x - (177.0 - 89.0 - 5.0)).abs() < 1.0 && (y - 250.0).abs() < 1.0, "{x} {y}");
+        for _ in 0..=10 {
+            assert_eq!(tracks.list.len(), 1);
+            tracks.update(&config, 10, &[], &[], [640, 480]);
+        }
+        assert!(tracks.list.is_empty(), "looks that find nothing end it");
+    }
+
+    #[test]
+    fn who_steps_in_front_of_a_body_is_followed_from_then_on() {
+        let config = DynamicConfig::default();
+        let mut tracks = walker(&config);
+        tracks.carry([640, 480]);
+        let track = &mut tracks.list[0];
+        assert!(track.can_be_at(&config, 2.1) && !track.can_be_at(&config, 1.5));
+        assert_eq!(track.hide(Some(2.9)), None, "what is farther hides nobody");
+        let in_front = track.hide(Some(1.5)).unwrap();
+        assert_eq!((in_front.depth_m, in_front.bbox), (Some(1.5), track.bbox));
+        assert_eq!(track.hide(Some(1.4)), None, "once is enough");
     }
 }

@@ -208,11 +208,12 @@ impl Slam {
         let boxes_are_due = self.start_detector(frame);
         self.extract(frame);
         times.features = clock.lap();
-        self.collect_boxes(frame, boxes_are_due);
+        let looked = self.collect_boxes(frame, boxes_are_due);
         times.detector_wait = clock.lap();
         let features = &mut self.tracker.current.features;
         let evidence = Evidence {
             movable: &self.movable,
+            looked,
             mask: frame.mask.as_deref(),
             gray: &self.gray,
             depth: &frame.depth,
@@ -317,23 +318,27 @@ impl Slam {
         due
     }
 
-    /// Boxes of movable objects for this frame. A frame the detector fails on counts as one without boxes, as does one for which none
-    /// are due: tracks carry it.
-    fn collect_boxes(&mut self, frame: &RgbdFrame, due: bool) {
+    /// Boxes of movable objects for this frame. Returns whether anybody looked for them: not if the detector fails, is late, or none are
+    /// due. Tracks carry such frames.
+    fn collect_boxes(&mut self, frame: &RgbdFrame, due: bool) -> bool {
         self.movable.clear();
         if let Some(known) = &frame.detections {
             self.movable.extend(known.iter().filter(|_| due));
-            return;
+            return due;
         }
-        let Some(detector) = &mut self.detector else { return };
+        let Some(detector) = &mut self.detector else { return false };
         // A map is not begun before it is known who is in it.
         let waits = !self.config.dynamic.detect_async || self.state == TrackingState::NotInitialized;
         match if waits { detector.finish() } else { detector.poll() } {
-            None => {}
-            Some(Ok(boxes)) => self.movable.extend(boxes.iter().filter(|d| self.movable_classes.contains(&d.class))),
+            None => false,
+            Some(Ok(boxes)) => {
+                self.movable.extend(boxes.iter().filter(|d| self.movable_classes.contains(&d.class)));
+                true
+            }
             Some(Err(error)) => {
                 tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
                 self.detector_failures += 1;
+                false
             }
         }
     }
