@@ -109,6 +109,9 @@ fn what_cannot_be_mapped_is_refused_with_a_cure() {
     fails(folder.path(), &["map", "nowhere"], &["nowhere", "yfslam run SEQUENCE --dense"]);
     fs::write(folder.path().join("dense.map"), b"%PDF-1.4").unwrap();
     fails(folder.path(), &["map", "."], &["dense.map", "this is no yfslam dense map"]);
+    let world = "synth:walking_xyz?width=320&height=240&frames=3";
+    succeeds(folder.path(), &["run", world, "--save-map", "room.map", "-q"]);
+    fails(folder.path(), &["map", "room.map"], &["room.map is a map from --save-map", "--dense"]);
     fails(folder.path(), &["map", ".", "--resolution", "0.5"], &["dense.resolution_m = 0.5", "0.01 to 0.2"]);
     fails(folder.path(), &["map", ".", "--up", "sideways"], &["sideways", "0,-1,0"]);
     fails(folder.path(), &["map", ".", "--band", "2,1"], &["'2,1'", "LOW,HIGH"]);

@@ -13,6 +13,7 @@ use yfslam::dense::mesh::mesh;
 use yfslam::dense::persist::decode;
 use yfslam::dense::{DenseConfig, Survey, Volume, up};
 use yfslam::image::{Image, RgbImage};
+use yfslam::map::persist::is_saved_map;
 use yfslam_io::write::{
     OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png, write_nav2, write_octomap,
     write_pcd, write_ply, write_ply_mesh,
@@ -196,6 +197,11 @@ impl DenseMapArgs {
         let bytes = std::fs::read(&file).with_context(|| {
             format!("cannot read {}; make it with `yfslam run SEQUENCE --dense`, or check the path", file.display())
         })?;
+        ensure!(
+            !is_saved_map(&bytes),
+            "{} is a map from --save-map: it holds landmarks to find a camera by, no surfaces; give the folder of a run with --dense",
+            file.display()
+        );
         let survey = decode(&bytes).with_context(|| format!("{} cannot be used", file.display()))?;
         ensure!(!survey.pieces.is_empty(), "{} holds no keyframe: the run tracked nothing", file.display());
         let beside = || file.parent().unwrap_or(Path::new(".")).join("map");

@@ -95,6 +95,11 @@ pub fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Ve
     KIND.pack(&Records::of(map, camera, features))
 }
 
+/// Whether bytes begin like a map.
+pub fn is_saved_map(bytes: &[u8]) -> bool {
+    bytes.starts_with(KIND.magic.as_bytes())
+}
+
 /// The map in `bytes`, checked.
 ///
 /// # Errors
