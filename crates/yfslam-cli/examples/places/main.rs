@@ -6,6 +6,7 @@
 //! cargo run --release -p yfslam-cli --example places -- trials --count 200 SEQUENCE...
 //! cargo run --release -p yfslam-cli --example places -- soak --rounds 20 SEQUENCE
 //! cargo run --release -p yfslam-cli --example places -- strangers corridor_loop
+//! cargo run --release -p yfslam-cli --example places -- recall --mapped 0.3 corridor_loop
 //! cargo run --release -p yfslam-cli --example places -- live SEQUENCE...
 //! ```
 //!
@@ -16,9 +17,11 @@
 mod film;
 mod live;
 mod loops;
+mod recall;
 mod soak;
 mod strangers;
 mod trials;
+mod words;
 
 use std::path::PathBuf;
 
@@ -66,6 +69,12 @@ enum Question {
         #[arg(long, default_value_t = 0.45)]
         mapped: f64,
     },
+    /// How many places are recognised without a single error, beside a bag of words trained on the same map.
+    Recall {
+        /// Share of the sequence that is mapped.
+        #[arg(long, default_value_t = 0.5)]
+        mapped: f64,
+    },
     /// A live camera: frames at 30 Hz, mapping on its own thread; start-up; localisation in the saved map.
     Live,
 }
@@ -84,6 +93,7 @@ fn main() -> Result<()> {
         }
         Question::Soak { rounds } => soak::table(&config, rounds, arguments.sequences.iter().map(open)),
         Question::Strangers { mapped } => strangers::table(&config, mapped, arguments.sequences.iter().map(open)),
+        Question::Recall { mapped } => recall::table(&config, mapped, arguments.sequences.iter().map(open)),
         Question::Live => live::table(&config, arguments.sequences.iter().map(open)),
     }
 }
