@@ -39,7 +39,8 @@ struct Part {
 /// Builds the world that the spec names and starts to render it.
 pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Source> {
     let mut config = args.world()?;
-    let depth_source = args.depth_source(configured, DepthSource::Image)?;
+    let offered = if config.stereo_m > 0.0 { DepthSource::Stereo } else { DepthSource::Image };
+    let depth_source = args.depth_source(configured, offered)?;
     config.detections = own_boxes.is_some();
     let count = config.frames;
     let range = args.start..args.end.unwrap_or(count).min(count);
