@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::dynamic::Method;
 use crate::dynamic::depth_group::Grouping;
 pub use dense::DenseConfig;
-pub use depth::{DepthConfig, DepthSource};
+pub use depth::{DepthConfig, DepthSource, StereoConfig};
 pub use places::{LoopConfig, PlaceConfig, PoseGraphConfig};
 pub use validate::ConfigError;
 
@@ -288,6 +288,8 @@ config_section! {
         features: FeatureConfig = FeatureConfig::default(),
         /// Sensor noise.
         depth: DepthConfig = DepthConfig::default(),
+        /// Depth from a stereo pair.
+        stereo: StereoConfig = StereoConfig::default(),
         /// Dynamic filter.
         dynamic: DynamicConfig = DynamicConfig::default(),
         /// Tracking.
@@ -315,6 +317,7 @@ config_section! {
 const SECTIONS: &[(&str, &str, FieldDocs)] = &[
     ("features", FeatureConfig::ABOUT, FeatureConfig::FIELDS),
     ("depth", DepthConfig::ABOUT, DepthConfig::FIELDS),
+    ("stereo", StereoConfig::ABOUT, StereoConfig::FIELDS),
     ("dynamic", DynamicConfig::ABOUT, DynamicConfig::FIELDS),
     ("tracking", TrackingConfig::ABOUT, TrackingConfig::FIELDS),
     ("keyframes", KeyframeConfig::ABOUT, KeyframeConfig::FIELDS),

@@ -69,6 +69,7 @@ pub mod map;
 pub mod mapping;
 pub mod optimize;
 pub mod packed;
+mod right_eye;
 pub mod sensor;
 pub mod system;
 pub mod tracking;

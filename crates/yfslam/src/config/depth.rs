@@ -33,3 +33,25 @@ config_section! {
         max_m: f64 = 20.0,
     }
 }
+
+config_section! {
+    /// Depth from a rectified stereo pair (ORB-SLAM2, IEEE T-RO 2017, section III-A).
+    StereoConfig {
+        /// Least depth that is sought, in baselines: nearer things lie where the other picture does not reach.
+        min_depth_baselines: f64 = 2.0,
+        /// Least disparity that counts as a depth, px.
+        min_disparity_px: f32 = 1.0,
+        /// Distance from its row in which a feature is sought, px at the finest level: corners are found to a pixel of their level.
+        row_band_px: f32 = 2.0,
+        /// Largest Hamming distance of a match. Between ORB-SLAM2's TH_LOW and TH_HIGH.
+        max_distance: u32 = 75,
+        /// Half the side of the patches that are laid upon each other, px of the level.
+        window_px: usize = 5,
+        /// Distance over which the patch slides each way, px of the level.
+        slide_px: usize = 4,
+        /// Patches that differ by more than this times the median difference are no match.
+        max_sad_medians: f32 = 2.0,
+        /// Standard deviation of a disparity at the finest level, px; grows with the scale of the level. ORB-SLAM2 weighs it like a corner.
+        disparity_sigma_px: f64 = 1.0,
+    }
+}

@@ -16,6 +16,11 @@ pub enum SetupError {
     /// A value of the configuration with which nothing can work.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// A stereo camera with lens distortion: points do not lie in the same row of both pictures.
+    #[error(
+        "depth.source is `stereo`, but the camera has distortion {0:?}: rectify the pictures and give the calibration without distortion"
+    )]
+    NotRectified([f64; 5]),
     /// A map made with other feature settings.
     #[error(
         "the map was made with {found} pyramid levels of scale {found_scale}, the configuration has {wanted} of {wanted_scale}: \
@@ -37,7 +42,7 @@ pub enum SetupError {
     )]
     MapCamera(usize, f64),
     /// A thread could not be started.
-    #[error("the detector's thread could not be started: {0}")]
+    #[error("a thread could not be started: {0}")]
     Thread(#[from] std::io::Error),
 }
 

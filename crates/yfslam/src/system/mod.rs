@@ -21,6 +21,7 @@ use crate::image::{DepthImage, GrayImage, Image, gray_from_rgb};
 use crate::loops::{LoopClosed, Reach, relocalise};
 use crate::map::persist::SavedMap;
 use crate::map::{KeyFrameId, Map};
+use crate::right_eye::{METRES_PER_UNIT, RightEye};
 use crate::sensor::SensorModel;
 use crate::tracking::{TrackedFrame, Tracker, TrackingState};
 pub use errors::{FrameRejected, SetupError};
@@ -84,8 +85,11 @@ pub struct Slam {
     sensor: Arc<SensorModel>,
     extractor: OrbExtractor,
     gray: GrayImage,
-    /// The depth image of a camera that has none, or whose depth is not to be used.
-    no_depth: Arc<DepthImage>,
+    /// Looks at right pictures, where depth comes from those.
+    right_eye: Option<RightEye>,
+    /// The depth image of a camera that has none, or whose depth is not to be used: zero, but around features that have a depth from
+    /// stereo.
+    own_depth: Arc<DepthImage>,
     extracted: Features,
     tracker: Tracker,
     owner: MapOwner,
@@ -121,6 +125,13 @@ impl Slam {
         config.validate()?;
         let extractor = OrbExtractor::new(&config.features);
         let sensor = Arc::new(SensorModel::new(camera, &config, extractor.scale_factors()));
+        let right_eye = match config.depth.source {
+            DepthSource::Stereo if camera.distortion != [0.0; 5] => {
+                return Err(SetupError::NotRectified(camera.distortion));
+            }
+            DepthSource::Stereo => Some(RightEye::open(&config, &sensor)?),
+            DepthSource::Image | DepthSource::Motion => None,
+        };
         let config = Arc::new(config);
         let backend = Backend::new(sensor.clone(), config.clone(), Map::default());
         // A method that asks for no boxes needs no detector.
@@ -156,7 +167,11 @@ impl Slam {
             config,
             extractor,
             gray: GrayImage::default(),
-            no_depth: Arc::new(DepthImage { raw: Image::new(camera.width, camera.height), metres_per_unit: 1.0 }),
+            right_eye,
+            own_depth: Arc::new(DepthImage {
+                raw: Image::new(camera.width, camera.height),
+                metres_per_unit: METRES_PER_UNIT,
+            }),
             extracted: Features::default(),
             tracker: Tracker::default(),
             state: TrackingState::NotInitialized,
@@ -209,8 +224,8 @@ impl Slam {
         let mut times = StageTimes::default();
         let mut clock = Stopwatch::start();
         let boxes_are_due = self.start_detector(frame);
+        self.extract(frame);
         let depth = self.depth_image(frame);
-        self.extract(frame, &depth);
         times.features = clock.lap();
         self.collect_boxes(frame, boxes_are_due);
         times.detector_wait = clock.lap();
@@ -350,17 +365,25 @@ impl Slam {
 
     /// The depth image that all stages see.
     fn depth_image(&self, frame: &RgbdFrame) -> Arc<DepthImage> {
-        if self.config.depth.source == DepthSource::Image { frame.depth.clone() } else { self.no_depth.clone() }
+        if self.config.depth.source == DepthSource::Image { frame.depth.clone() } else { self.own_depth.clone() }
     }
 
     /// Features of the frame with depth, undistorted.
-    fn extract(&mut self, frame: &RgbdFrame, depth: &DepthImage) {
+    fn extract(&mut self, frame: &RgbdFrame) {
+        let count = self.features_wanted();
+        if let (Some(right_eye), Some(right)) = (&mut self.right_eye, &frame.right) {
+            right_eye.start(right, count);
+        }
         gray_from_rgb(&frame.color, &mut self.gray);
-        self.extractor.set_count(self.features_wanted());
+        self.extractor.set_count(count);
         self.extractor.extract(&self.gray, &mut self.extracted);
         self.tracker.begin_frame(frame.timestamp_ns);
         let current = &mut self.tracker.current;
-        current.features.fill(&self.extracted, depth, &self.sensor.camera, self.sensor.bounds);
+        let image = if self.config.depth.source == DepthSource::Image { &*frame.depth } else { &DepthImage::default() };
+        current.features.fill(&self.extracted, image, &self.sensor.camera, self.sensor.bounds);
+        if let (Some(right_eye), Some(spots)) = (&mut self.right_eye, Arc::get_mut(&mut self.own_depth)) {
+            right_eye.finish(&self.extractor, &self.extracted, &mut current.features, spots);
+        }
         current.clear_sights();
     }
 
