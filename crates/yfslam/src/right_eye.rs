@@ -25,6 +25,8 @@ type Request = (Arc<RgbImage>, usize, Box<StereoView>);
 /// Looks at right pictures.
 pub struct RightEye {
     matcher: StereoMatcher,
+    /// Features asked for, as a multiple of those in the left picture.
+    right_features: f64,
     /// `None` once the thread was told to end.
     requests: Option<SyncSender<Request>>,
     answers: Receiver<Box<StereoView>>,
@@ -52,6 +54,7 @@ impl RightEye {
         })?;
         Ok(Self {
             matcher: StereoMatcher::new(&config.stereo, sensor.pinhole.bf, sensor.pinhole.fx),
+            right_features: config.stereo.right_features,
             requests: Some(requests),
             answers,
             thread: Some(thread),
@@ -59,11 +62,11 @@ impl RightEye {
         })
     }
 
-    /// Hands over the right picture of this frame; `count` features are asked for.
+    /// Hands over the right picture of this frame, in whose left picture `count` features are asked for.
     pub fn start(&mut self, picture: &Arc<RgbImage>, count: usize) {
         if let (Some(requests), Some(view)) = (&self.requests, self.view.take()) {
             // A thread that is gone shows when its view is asked for.
-            let _ = requests.send((Arc::clone(picture), count, view));
+            let _ = requests.send((Arc::clone(picture), (self.right_features * count as f64) as usize, view));
         }
     }
 

@@ -23,7 +23,7 @@ impl Config {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let share = |x: f64| (0.0..=1.0).contains(&x);
         let (f, d, s, t) = (&self.features, &self.depth, &self.stereo, &self.tracking);
-        let checks: [(&'static str, String, bool, &'static str); 22] = [
+        let checks: [(&'static str, String, bool, &'static str); 23] = [
             ("features.count", f.count.to_string(), f.count > 0, "at least 1"),
             ("features.levels", f.levels.to_string(), (1..=16).contains(&f.levels), "from 1 to 16"),
             (
@@ -47,6 +47,12 @@ impl Config {
                 "a positive number of baselines",
             ),
             ("depth.max_m", d.max_m.to_string(), positive(d.max_m), "a positive length in m"),
+            (
+                "stereo.right_features",
+                s.right_features.to_string(),
+                (1.0..=10.0).contains(&s.right_features),
+                "from 1 to 10",
+            ),
             (
                 "stereo.min_depth_baselines",
                 s.min_depth_baselines.to_string(),
