@@ -94,8 +94,8 @@ pub struct RunArgs {
     /// Write `report.html`: errors, trajectory, pictures and times on one page that needs no network.
     #[arg(long, help_heading = "Output")]
     report: bool,
-    /// True trajectory in TUM format to judge the result by [default: groundtruth.txt in the folder, if it is there]. The estimator
-    /// never sees it.
+    /// True trajectory to judge the result by, in TUM format or that of the folder's layout [default: groundtruth.txt, or EuRoC's or
+    /// KITTI's own, if it is there]. The estimator never sees it.
     #[arg(long, value_name = "FILE", help_heading = "Evaluation")]
     groundtruth: Option<PathBuf>,
     #[command(flatten)]
@@ -222,7 +222,7 @@ fn lanes(
 
 /// A broken ground truth ends the run if it was asked for; one that merely lies in the folder is passed over.
 fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Option<Truth>> {
-    match source.truth(&args.source, args.groundtruth.as_deref(), terminal) {
+    match source.truth(args.groundtruth.as_deref(), terminal) {
         Err(error) if args.groundtruth.is_none() => {
             terminal.warn(&format!("no evaluation: {}", explain(&error)));
             Ok(None)

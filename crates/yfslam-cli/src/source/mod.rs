@@ -14,16 +14,16 @@ use yfslam::RgbdFrame;
 use yfslam::config::DepthSource;
 use yfslam_eval::StampedPose;
 use yfslam_io::boxes::{BOXES_FILE, KnownDetections};
-use yfslam_io::sequence::AssociationReport;
+use yfslam_io::sequence::{AssociationReport, TruthReader};
 use yfslam_io::time::{TimeMirror, format_stamp};
 use yfslam_io::trajectory::mirror_trajectory;
-use yfslam_io::{CameraSource, Delivery, Fault, FaultInjector, FrameStream, load_camera};
+use yfslam_io::{CameraSource, Delivery, Fault, FaultInjector, FrameStream, TrajectoryFile, load_camera};
 use yfslam_synth::{WorldConfig, default_camera, parse_with_camera};
 
-use crate::accuracy::{read_poses, to_eval};
+use crate::accuracy::{checked_poses, to_eval};
 use crate::pipeline::Stages;
 use crate::terminal::Terminal;
-pub use folder::{camera, open_sequence};
+pub use folder::open_sequence;
 pub use masks::MaskTally;
 use masks::Masks;
 pub use synth::{Renderer, world_camera};
@@ -35,11 +35,11 @@ const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Input")]
 pub struct SourceArgs {
-    /// A folder in TUM RGB-D or Bonn layout, or a synthetic world such as `synth:walking_xyz?seed=7`.
+    /// A folder in TUM RGB-D, Bonn, EuRoC or KITTI odometry layout, or a synthetic world such as `synth:walking_xyz?seed=7`.
     #[arg(value_name = "SEQUENCE", help_heading = None)]
     pub sequence: String,
     /// The camera: tum1, tum2, tum3, bonn, or a settings file (ORB-SLAM's YAML or our TOML) [default: camera.toml or camera.yaml in
-    /// the folder]. A synthetic world is rendered for it.
+    /// the folder, or EuRoC's and KITTI's own calibration]. A synthetic world is rendered for it.
     #[arg(long, value_name = "PRESET|FILE")]
     pub camera: Option<String>,
     /// What the camera measures [default: what the sequence has]. `mono` leaves depth, or the right pictures, unused.
@@ -48,7 +48,7 @@ pub struct SourceArgs {
     /// Depth units per metre, instead of the camera's: 5000 for TUM and Bonn, 1000 for millimetres.
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     pub depth_factor: Option<f64>,
-    /// How far apart a colour and a depth image may be, ms.
+    /// How far apart a colour image and its depth image or right picture may be, ms.
     #[arg(long, value_name = "MS", default_value_t = ASSOCIATION_TOLERANCE_MS, allow_negative_numbers = true)]
     pub association_tolerance: f64,
     /// Masks of movable objects, a PNG for each colour image and named like it (or by its time, or listed in `masks.txt`): 0 where
@@ -93,10 +93,12 @@ pub struct Source {
     pub frames: Frames,
     /// Stamps of all frames, also of those that will turn out unusable, ns.
     pub stamps_ns: Vec<i64>,
-    /// What was left out when colour and depth were paired; `None` for synthetic worlds.
+    /// What was left out when colour images and their companions were paired; `None` for synthetic worlds.
     pub association: Option<AssociationReport>,
     /// Which frames have a mask, where masks were asked for.
     pub masks: Option<MaskTally>,
+    /// Reads ground truth in the format of the folder; `None` for synthetic worlds.
+    pub truth_reader: Option<TruthReader>,
     /// Set when the sequence is played backward.
     pub mirror: Option<TimeMirror>,
 }
@@ -221,19 +223,23 @@ impl SourceArgs {
         }
     }
 
-    /// Where depth comes from: the flag wins over the configuration, and that, if it asks for anything special, over `offered`, what the
-    /// sequence has.
+    /// Where depth is to come from: the flag wins over the configuration, and that, if it asks for anything special, over what the
+    /// sequence has (`None`).
+    fn wanted_depth_source(&self, configured: DepthSource) -> Option<DepthSource> {
+        match self.sensor {
+            Some(SensorArg::Rgbd) => Some(DepthSource::Image),
+            Some(SensorArg::Stereo) => Some(DepthSource::Stereo),
+            Some(SensorArg::Mono) => Some(DepthSource::Motion),
+            None => Some(configured).filter(|configured| *configured != DepthSource::Image),
+        }
+    }
+
+    /// Where depth comes from in a sequence that has what is `offered`.
     ///
     /// # Errors
     /// The sequence does not have what was asked for.
     fn depth_source(&self, configured: DepthSource, offered: DepthSource) -> Result<DepthSource> {
-        let wanted = match self.sensor {
-            Some(SensorArg::Rgbd) => DepthSource::Image,
-            Some(SensorArg::Stereo) => DepthSource::Stereo,
-            Some(SensorArg::Mono) => DepthSource::Motion,
-            None if configured == DepthSource::Image => offered,
-            None => configured,
-        };
+        let wanted = self.wanted_depth_source(configured).unwrap_or(offered);
         ensure!(
             wanted == offered || wanted == DepthSource::Motion,
             "{} has no {}; leave out --sensor {} (or depth.source in --config), or use `mono`",
@@ -290,21 +296,22 @@ impl Source {
         }
     }
 
-    /// The truth to judge an estimate by: a file, the folder's own `groundtruth.txt`, or the synthetic world's.
+    /// The truth to judge an estimate by: a file, the folder's own, or the synthetic world's.
     ///
     /// # Errors
     /// The file cannot be read or holds values that are no pose.
-    pub fn truth(&self, args: &SourceArgs, file: Option<&Path>, terminal: Terminal) -> Result<Option<Truth>> {
-        let beside = || Some(args.folder().join("groundtruth.txt")).filter(|path| path.is_file());
+    pub fn truth(&self, file: Option<&Path>, terminal: Terminal) -> Result<Option<Truth>> {
+        let reader = self.truth_reader.as_ref();
         let path = match (file, self.truth_of_world()) {
             (None, Some(truth)) => return Ok(Some(truth)),
-            (Some(file), _) => file.to_owned(),
-            (None, None) => match beside() {
+            (Some(file), _) => file,
+            (None, None) => match reader.and_then(TruthReader::path) {
                 Some(path) => path,
                 None => return Ok(None),
             },
         };
-        let mut poses = read_poses(&path, terminal)?;
+        let read = reader.map_or_else(|| TrajectoryFile::read(path), |reader| reader.read(path))?;
+        let mut poses = checked_poses(read, path, terminal);
         if let Some(mirror) = self.mirror {
             poses = mirror_trajectory(&poses, mirror);
         }

@@ -67,6 +67,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
         frames: Frames::new(Player::Synth(renderer), depth_source, args, &stamps_ns),
         stamps_ns,
         association: None,
+        truth_reader: None,
         masks: None,
     })
 }
