@@ -54,7 +54,8 @@ config_section! {
         slide_px: usize = 5,
         /// Patches that differ by more than this times the median difference are no match.
         max_sad_medians: f32 = 3.0,
-        /// Standard deviation of a disparity at the finest level, px; grows with the scale of the level. ORB-SLAM2 weighs it like a corner.
-        disparity_sigma_px: f64 = 1.0,
+        /// Standard deviation of a disparity at the finest level, px; grows with the scale of the level. On rendered pairs it is 0.1 for two
+        /// of three features, 0.2 for nine of ten, and 0.25 gave smaller errors of the trajectory than 0.5 or 1. ORB-SLAM2 has 1.
+        disparity_sigma_px: f64 = 0.25,
     }
 }

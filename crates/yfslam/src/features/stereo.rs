@@ -122,7 +122,9 @@ impl StereoMatcher {
                 self.found.push(Match { feature: i as u32, disparity_px, sad });
             }
         }
-        let limit = self.config.max_sad_medians * self.median_sad();
+        // A grey level for each pixel is no difference.
+        let pixels = (2 * self.config.window_px + 1).pow(2) as f32;
+        let limit = self.config.max_sad_medians * self.median_sad().max(pixels);
         for m in self.found.iter().filter(|m| m.sad as f32 <= limit) {
             tell(m.feature as usize, self.bf / m.disparity_px);
         }
