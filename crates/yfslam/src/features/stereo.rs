@@ -3,6 +3,8 @@
 //! In: the features of the left picture with its pyramid, and those of the right. Out: a depth for each left feature that was found
 //! again: along its row by descriptor, then to a fraction of a pixel by the sum of absolute differences (SAD) of the patches.
 
+use fearless_simd::{Level, Simd, dispatch};
+
 use super::{KeyPoint, OrbExtractor};
 use crate::config::{FeatureConfig, StereoConfig};
 use crate::features::{Descriptor, Features};
@@ -112,6 +114,18 @@ impl StereoMatcher {
         right: &StereoView,
         mut tell: impl FnMut(usize, f32),
     ) {
+        // Compiled for each instruction set: the baseline of x86-64 counts no bits and sums few differences at a time.
+        dispatch!(Level::new(), simd => self.find_all(simd, extractor, left, right));
+        // A grey level for each pixel is no difference.
+        let pixels = (2 * self.config.window_px + 1).pow(2) as f32;
+        let limit = self.config.max_sad_medians * self.median_sad().max(pixels);
+        for m in self.found.iter().filter(|m| m.sad as f32 <= limit) {
+            tell(m.feature as usize, self.bf / m.disparity_px);
+        }
+    }
+
+    #[inline(always)]
+    fn find_all<S: Simd>(&mut self, _: S, extractor: &OrbExtractor, left: &Features, right: &StereoView) {
         self.found.clear();
         for (i, (point, descriptor)) in left.key_points.iter().zip(&left.descriptors).enumerate() {
             let Some(guess) = self.most_alike(extractor, point, descriptor, right) else { continue };
@@ -122,15 +136,10 @@ impl StereoMatcher {
                 self.found.push(Match { feature: i as u32, disparity_px, sad });
             }
         }
-        // A grey level for each pixel is no difference.
-        let pixels = (2 * self.config.window_px + 1).pow(2) as f32;
-        let limit = self.config.max_sad_medians * self.median_sad().max(pixels);
-        for m in self.found.iter().filter(|m| m.sad as f32 <= limit) {
-            tell(m.feature as usize, self.bf / m.disparity_px);
-        }
     }
 
     /// Column of the right feature that looks most like a left one, among those that may be the same point.
+    #[inline(always)]
     fn most_alike(
         &self,
         extractor: &OrbExtractor,
@@ -162,6 +171,7 @@ impl StereoMatcher {
 
     /// Disparity to a fraction of a pixel, px, and the SAD there: the left patch slides along the right picture around `guess`, both at
     /// the level of the feature.
+    #[inline(always)]
     fn refine(
         &mut self,
         extractor: &OrbExtractor,
@@ -208,6 +218,7 @@ struct Patch {
 
 impl Patch {
     /// Takes the patch around (x, y) of `plane`; `None` if it reaches beyond the border.
+    #[inline(always)]
     fn take(&mut self, plane: &Plane, x: isize, y: isize, half: usize) -> Option<()> {
         self.half = half;
         self.pixels.clear();
@@ -220,6 +231,7 @@ impl Patch {
     }
 
     /// Appends the SAD of the patch with `plane` around (x, y), (x + 1, y) and so on, `count` of them; `None` beyond the border.
+    #[inline(always)]
     fn slide(&mut self, plane: &Plane, x: isize, y: isize, count: usize, sads: &mut Vec<u32>) -> Option<()> {
         let side = 2 * self.half + 1;
         let width = side + count - 1;
@@ -242,11 +254,13 @@ impl Patch {
     }
 }
 
+#[inline(always)]
 fn rounded_mean(sum: u32, count: usize) -> i16 {
     ((2 * sum + count as u32) / (2 * count as u32).max(1)) as i16
 }
 
 /// `width` pixels from `x - half` on, of each row from `y - half` to `y + half`; `None` if any lies beyond the border.
+#[inline(always)]
 fn rows_around(plane: &Plane, x: isize, y: isize, half: usize, width: usize) -> Option<impl Iterator<Item = &[u8]>> {
     let first = usize::try_from(x).ok()?.checked_sub(half)?;
     let top = usize::try_from(y).ok()?.checked_sub(half)?;
