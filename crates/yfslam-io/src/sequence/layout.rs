@@ -141,8 +141,8 @@ fn no_lists(folder: &Path, wanted: &[&str]) -> Error {
     let problem = format!("holds no {} and no associations.txt", missing.join(", no "));
     let cure = match nested {
         Some(path) => format!("did you mean {}?", path.display()),
-        None => "name a folder in TUM RGB-D layout (rgb.txt and depth.txt or right.txt, or associations.txt), in EuRoC layout (mav0/) or in KITTI \
-             odometry layout (times.txt, image_0/ or image_2/)"
+        None => "name a folder in TUM RGB-D layout (rgb.txt and depth.txt or right.txt, or associations.txt), in EuRoC layout (mav0/) or in \
+             KITTI odometry layout (times.txt, image_0/ or image_2/)"
             .into(),
     };
     Error::content(folder, problem, cure)

@@ -2,13 +2,13 @@
 
 mod errors;
 mod results;
+mod times;
 
 use std::sync::{Arc, PoisonError};
-use std::time::{Duration, Instant};
 
 use nalgebra::Point3;
 
-use crate::backend::{Backend, Execution, Inserted, MapOwner};
+use crate::backend::{Backend, Execution, MapOwner};
 use crate::camera::Camera;
 use crate::config::{Config, DepthSource};
 use crate::detection::{Detection, Detector};
@@ -25,6 +25,8 @@ use crate::right_eye::{METRES_PER_UNIT, RightEye};
 use crate::sensor::SensorModel;
 use crate::tracking::{TrackedFrame, Tracker, TrackingState};
 pub use errors::{FrameRejected, SetupError};
+pub use times::StageTimes;
+use times::Stopwatch;
 
 /// What became of one frame.
 #[derive(Clone, Debug)]
@@ -43,23 +45,6 @@ pub struct Tracked {
     pub loop_closed: Option<LoopClosed>,
     /// Where the time went.
     pub times: StageTimes,
-}
-
-/// Wall time of the stages of one frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StageTimes {
-    /// Grey image and feature extraction.
-    pub features: Duration,
-    /// Waiting for the detector, which ran beside feature extraction.
-    pub detector_wait: Duration,
-    /// Dynamic filter, both doors.
-    pub dynamic: Duration,
-    /// Pose from last frame and local map.
-    pub tracking: Duration,
-    /// Keyframe insertion and local bundle adjustment, where it became known; zero for most frames.
-    pub mapping: Duration,
-    /// Place recognition: loops for keyframes, the way back for frames that are lost.
-    pub places: Duration,
 }
 
 /// What becomes of a map from an earlier session.
@@ -482,15 +467,6 @@ impl Slam {
     }
 }
 
-impl StageTimes {
-    /// Adds what a keyframe took; returns the loop that it closed.
-    fn note(&mut self, inserted: &Inserted) -> Option<LoopClosed> {
-        self.mapping += inserted.mapping;
-        self.places += inserted.places;
-        inserted.loop_closed
-    }
-}
-
 /// Compares the frame with the map by its first pose; what turns out to move is dropped, and the pose refined without it.
 fn sharpen(
     filter: &mut dyn DynamicFilter,
@@ -503,19 +479,5 @@ fn sharpen(
     if filter.after_pose(&config.dynamic, &first, &mut current.features) {
         current.drop_distrusted();
         current.refine_pose(sensor, &config.pose);
-    }
-}
-
-/// Measures consecutive stages.
-struct Stopwatch(Instant);
-
-impl Stopwatch {
-    fn start() -> Self {
-        Self(Instant::now())
-    }
-
-    fn lap(&mut self) -> Duration {
-        let now = Instant::now();
-        now.duration_since(std::mem::replace(&mut self.0, now))
     }
 }
