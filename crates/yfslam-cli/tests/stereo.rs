@@ -61,7 +61,7 @@ fn a_rendered_and_a_recorded_stereo_camera_give_the_same_trajectory_and_a_right_
 #[test]
 fn people_are_kept_out_by_every_method_that_boxes_or_outlines_them() {
     let folder = tempfile::tempdir().unwrap();
-    let crowd = "synth:walking_xyz?people=3&share=0.5&width=320&height=240&frames=40&stereo=0.2";
+    let crowd = "synth:walking_xyz?people=3&share=0.5&width=320&height=240&frames=60&stereo=0.2";
     succeeds(folder.path(), &["run", crowd, "--method", "none,boxes,yf,full", "--out", "out"]);
     let of = |method: &str| report(&folder.path().join("out").join(method));
     let unfiltered_m = ate_rmse(&of("none"));
@@ -69,7 +69,8 @@ fn people_are_kept_out_by_every_method_that_boxes_or_outlines_them() {
         let report = of(method);
         let ate_m = ate_rmse(&report);
         println!("{method}: ATE {ate_m:.4} m, unfiltered {unfiltered_m:.4} m");
-        assert_eq!(report["frames"]["tracked"], 40, "{method}");
+        assert_eq!(report["frames"]["tracked"], 60, "{method}");
+        // With the filters as they are it is a tenth.
         assert!(ate_m < unfiltered_m / 3.0, "{method}: {ate_m} m of {unfiltered_m} m");
     }
 }
