@@ -55,14 +55,19 @@ pub fn judge(
 /// # Errors
 /// The file cannot be read or holds values that are no pose.
 pub fn read_poses(path: &Path, terminal: Terminal) -> Result<Vec<yfslam_io::StampedPose>> {
-    let TrajectoryFile { poses, duplicates_skipped, backward_skipped } = TrajectoryFile::read(path)?;
+    Ok(checked_poses(TrajectoryFile::read(path)?, path, terminal))
+}
+
+/// The poses that were read from `path`; warns of what was left out.
+pub fn checked_poses(file: TrajectoryFile, path: &Path, terminal: Terminal) -> Vec<yfslam_io::StampedPose> {
+    let TrajectoryFile { poses, duplicates_skipped, backward_skipped } = file;
     if duplicates_skipped + backward_skipped > 0 {
         terminal.warn(&format!(
             "{}: {duplicates_skipped} poses skipped because their stamp repeats, {backward_skipped} because it runs backward",
             path.display()
         ));
     }
-    Ok(poses)
+    poses
 }
 
 /// Poses in the type of the evaluator.

@@ -73,10 +73,10 @@ pub struct MapSize {
 #[derive(Serialize)]
 pub struct Association {
     pub color_listed: usize,
-    pub depth_listed: usize,
+    pub companions_listed: usize,
     pub paired: usize,
     pub color_unmatched: usize,
-    pub depth_unmatched: usize,
+    pub companions_unmatched: usize,
     pub duplicate_stamps_skipped: usize,
     pub backward_stamps_skipped: usize,
     pub unstamped_skipped: usize,
@@ -117,10 +117,10 @@ impl From<&AssociationReport> for Association {
     fn from(report: &AssociationReport) -> Self {
         Self {
             color_listed: report.color_listed,
-            depth_listed: report.depth_listed,
+            companions_listed: report.companions_listed,
             paired: report.paired,
             color_unmatched: report.color_unmatched,
-            depth_unmatched: report.depth_unmatched,
+            companions_unmatched: report.companions_unmatched,
             duplicate_stamps_skipped: report.duplicates_skipped,
             backward_stamps_skipped: report.backward_skipped,
             unstamped_skipped: report.unstamped_skipped,

@@ -6,6 +6,7 @@
 use std::ops::RangeInclusive;
 
 use yfslam::Camera;
+use yfslam::config::DepthSource;
 use yfslam::image::Image;
 
 use crate::error::{Error, Result};
@@ -93,11 +94,12 @@ pub fn check_depth_factor<'a>(
     Err(Error::argument(problem, cure))
 }
 
-/// Decodes the first usable frames of `sequence` and checks `camera` against them: image size and depth factor.
+/// Decodes the first usable frames of `sequence` and checks `camera` against them: image size and, where there is depth, its factor.
+/// `None` without depth images.
 ///
 /// # Errors
 /// None of the first frames can be used, for the reason that the message gives, or the depth factor is implausible.
-pub fn check_recording(sequence: &Sequence, camera: &Camera) -> Result<DepthStatistics> {
+pub fn check_recording(sequence: &Sequence, camera: &Camera) -> Result<Option<DepthStatistics>> {
     let first = sequence.entries.iter().take(PROBE_ATTEMPTS).cloned().collect();
     let first = Sequence { entries: first, ..sequence.clone() };
     let (mut depths, mut first_error) = (Vec::new(), None);
@@ -115,7 +117,8 @@ pub fn check_recording(sequence: &Sequence, camera: &Camera) -> Result<DepthStat
             let problem = format!("none of the first {} frames can be used", first.entries.len());
             Err(Error::content(&sequence.folder, problem, error.to_string()))
         }
-        _ => check_depth_factor(depths.iter().map(|depth| &depth.raw), camera.depth_factor),
+        _ if sequence.depth_source != DepthSource::Image => Ok(None),
+        _ => check_depth_factor(depths.iter().map(|depth| &depth.raw), camera.depth_factor).map(Some),
     }
 }
 

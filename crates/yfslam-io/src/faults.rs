@@ -182,11 +182,12 @@ impl FaultInjector {
     }
 }
 
-/// Replaces the colour image by one without anything that a detector could find.
+/// Replaces the colour image, and the right picture, by one without anything that a detector could find.
 fn show(frame: &mut RgbdFrame, color: impl Fn(usize) -> [u8; 3]) {
     let mut image = RgbImage::new(frame.color.width(), frame.color.height());
     image.data_mut().iter_mut().enumerate().for_each(|(pixel, rgb)| *rgb = color(pixel));
     frame.color = Arc::new(image);
+    frame.right = frame.right.as_ref().map(|_| frame.color.clone());
     frame.detections = frame.detections.as_ref().map(|_| Vec::new());
 }
 

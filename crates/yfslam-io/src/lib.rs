@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! folder ──Sequence──► entries ──FrameStream──► RgbdFrame, or a FrameError for a frame that cannot be used
+//!   TUM, EuRoC, KITTI              decoded, stereo pairs rectified
 //! preset, settings file or TOML ──load_camera──► Camera
 //! frames ──FaultInjector──► frames as a faulty camera sends them ──RecordingWriter──► folder, with its BoxList
 //! trajectory file ◄──► TrajectoryFile        points, pictures, text ──write_atomically──► files
@@ -35,6 +36,7 @@ pub mod decode;
 pub mod depth;
 pub mod error;
 pub mod faults;
+pub mod rectify;
 pub mod sequence;
 pub mod stream;
 mod text;

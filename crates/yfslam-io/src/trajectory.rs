@@ -56,6 +56,11 @@ impl TrajectoryFile {
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let poses =
             content_lines(text).map(|(number, line)| parse_pose(line, path, number)).collect::<Result<Vec<_>>>()?;
+        Self::from_poses(poses, path)
+    }
+
+    /// Poses read from `path` in some format, those kept whose stamps ascend.
+    pub(crate) fn from_poses(poses: Vec<StampedPose>, path: &Path) -> Result<Self> {
         if poses.is_empty() {
             return Err(Error::content(path, "holds no pose", FORMAT_CURE));
         }

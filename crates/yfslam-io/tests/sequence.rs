@@ -8,7 +8,13 @@ use std::path::Path;
 
 use common::{real_data, write_sequence};
 use proptest::prelude::*;
+use yfslam_io::sequence::FrameEntry;
+use yfslam_io::sequence::lists::ListedFile;
 use yfslam_io::{Sequence, SequenceOptions};
+
+fn depth(entry: &FrameEntry) -> &ListedFile {
+    entry.companion.as_ref().unwrap()
+}
 
 fn refusal(folder: &Path) -> String {
     Sequence::open(folder, &SequenceOptions::default()).unwrap_err().to_string()
@@ -21,7 +27,7 @@ fn a_tum_folder_is_paired_by_time() {
     let sequence = Sequence::open(folder.path(), &SequenceOptions::default()).unwrap();
     assert_eq!((sequence.entries.len(), sequence.report.paired, sequence.report.color_unmatched), (12, 12, 0));
     let entry = &sequence.entries[11];
-    assert_eq!((entry.timestamp_ns, entry.depth_timestamp_ns), (101_100_000_000, 101_105_000_000));
+    assert_eq!((entry.timestamp_ns, depth(entry).stamp_ns), (101_100_000_000, 101_105_000_000));
     assert_eq!(entry.color_path, folder.path().join("rgb/11.png"));
     let strict = SequenceOptions { association_tolerance_ns: 4_000_000, ..Default::default() };
     let error = Sequence::open(folder.path(), &strict).unwrap_err().to_string();
@@ -43,9 +49,9 @@ fn unmatched_duplicate_and_backward_images_are_counted_and_left_out() {
     .unwrap();
     fs::write(path.join("depth.txt"), "100.005 depth/0.png\n100.205 depth/2.png\n100.3 depth/3.png\n").unwrap();
     let report = Sequence::open(path, &SequenceOptions::default()).unwrap().report;
-    assert_eq!((report.color_listed, report.depth_listed, report.paired), (5, 3, 2));
+    assert_eq!((report.color_listed, report.companions_listed, report.paired), (5, 3, 2));
     assert_eq!((report.duplicates_skipped, report.backward_skipped), (1, 1));
-    assert_eq!((report.color_unmatched, report.depth_unmatched), (1, 1));
+    assert_eq!((report.color_unmatched, report.companions_unmatched), (1, 1));
 }
 
 #[test]
@@ -60,8 +66,8 @@ fn an_associations_file_is_taken_at_its_word_in_either_order_of_columns() {
         let sequence = Sequence::open(folder.path(), &SequenceOptions::default()).unwrap();
         assert!(sequence.report.from_associations_file);
         let first = &sequence.entries[0];
-        assert_eq!((first.timestamp_ns, first.depth_timestamp_ns), (100_000_000_000, 100_900_000_000));
-        assert!(first.color_path.ends_with("rgb/0.png") && first.depth_path.ends_with("depth/0.png"));
+        assert_eq!((first.timestamp_ns, depth(first).stamp_ns), (100_000_000_000, 100_900_000_000));
+        assert!(first.color_path.ends_with("rgb/0.png") && depth(first).path.ends_with("depth/0.png"));
     }
     fs::write(folder.path().join("associations.txt"), "1 rgb/0.png 1 depth/0.png\n2 rgb/1.png 2 depth/0.png\n")
         .unwrap();
@@ -80,7 +86,7 @@ fn a_part_is_cut_out_and_played_backward_with_ascending_stamps() {
     assert!(
         sequence.entries[0].color_path.ends_with("rgb/5.png") && sequence.entries[3].color_path.ends_with("rgb/2.png")
     );
-    assert_eq!(sequence.entries[0].depth_timestamp_ns, 100_195_000_000);
+    assert_eq!(depth(&sequence.entries[0]).stamp_ns, 100_195_000_000);
     let mirror = sequence.mirror.unwrap();
     assert_eq!((mirror.first_ns, mirror.last_ns), (100_200_000_000, 100_500_000_000));
 
@@ -165,8 +171,7 @@ fn association_of_the_development_recordings_equals_their_published_pairs() {
             std::os::unix::fs::symlink(folder.join(images), lists.path().join(images)).unwrap();
         }
         let ours = Sequence::open(lists.path(), &SequenceOptions::default()).unwrap();
-        let stamps =
-            |s: &Sequence| s.entries.iter().map(|e| (e.timestamp_ns, e.depth_timestamp_ns)).collect::<Vec<_>>();
+        let stamps = |s: &Sequence| s.entries.iter().map(|e| (e.timestamp_ns, depth(e).stamp_ns)).collect::<Vec<_>>();
         assert_eq!(stamps(&ours), stamps(&published), "{name}");
     }
 }
@@ -202,12 +207,12 @@ proptest! {
             let report = &sequence.report;
             prop_assert_eq!(report.paired, sequence.entries.len());
             let skipped = report.duplicates_skipped + report.backward_skipped;
-            let unmatched = report.color_unmatched + report.depth_unmatched;
+            let unmatched = report.color_unmatched + report.companions_unmatched;
             let accounted = match report.from_associations_file {
                 true => 2 * (report.paired + skipped),
                 false => 2 * report.paired + skipped + unmatched,
             };
-            prop_assert_eq!(report.color_listed + report.depth_listed, accounted);
+            prop_assert_eq!(report.color_listed + report.companions_listed, accounted);
             let _ = sequence.info();
         }
     }

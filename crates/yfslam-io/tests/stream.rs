@@ -86,7 +86,7 @@ fn the_development_recordings_decode_without_an_error() {
         println!(
             "{name}: {count} frames, ms a frame: colour {:.2}, depth {:.2}, waited {:.2}",
             ms(times.color),
-            ms(times.depth),
+            ms(times.companion),
             ms(times.waited)
         );
     }
@@ -97,7 +97,7 @@ fn a_recording_is_checked_against_its_camera_before_it_is_played() {
     let folder = tempfile::tempdir().unwrap();
     write_sequence(folder.path(), 40);
     let sequence = Sequence::open(folder.path(), &SequenceOptions::default()).unwrap();
-    let statistics = check_recording(&sequence, &camera()).unwrap();
+    let statistics = check_recording(&sequence, &camera()).unwrap().unwrap();
     assert!((statistics.median_m - 1.0004).abs() < 1e-9 && statistics.valid_share == 1.0, "{statistics:?}");
 
     let refusal = |camera: &Camera| check_recording(&sequence, camera).unwrap_err().to_string();

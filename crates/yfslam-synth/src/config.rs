@@ -114,6 +114,9 @@ pub struct WorldConfig {
     /// The camera that is rendered, lens distortion included. Its `fps` is the frame rate, its `depth_factor` the unit
     /// of depth, its `bf` the baseline of the depth sensor.
     pub camera: Camera,
+    /// Distance of a second camera to the right of the first, m; 0 for none. A stereo camera has no depth image, no lens distortion,
+    /// and `camera.bf` is this times `camera.fx`.
+    pub stereo_m: f64,
     /// Strength of the hand shake; 1 has the path length of `walking_static`, 0 none.
     pub hand_shake: f64,
     /// Light and its quality.
@@ -140,6 +143,7 @@ impl Default for WorldConfig {
             frames: 300,
             seed: 1,
             camera: default_camera(),
+            stereo_m: 0.0,
             hand_shake: 1.0,
             light: LightConfig::default(),
             sensor: SensorConfig::default(),
@@ -342,6 +346,18 @@ impl WorldConfig {
         let factor = camera.depth_factor;
         check((1.0..=1e6).contains(&factor), "camera.depth_factor", factor, "between 1 and 1000000 units per metre")?;
         check(camera.bf.is_finite() && camera.bf >= 0.0, "camera.bf", camera.bf, "at least 0 px·m")?;
+        check((0.0..=2.0).contains(&self.stereo_m), "stereo_m", self.stereo_m, "between 0 and 2 m")?;
+        if self.stereo_m > 0.0 {
+            let distortion = camera.distortion;
+            check(
+                distortion == [0.0; 5],
+                "camera.distortion",
+                format!("{distortion:?}"),
+                "zero for a stereo camera, whose pictures are rectified (such as --camera tum3)",
+            )?;
+            let same = (camera.bf / (self.stereo_m * camera.fx) - 1.0).abs() < 1e-6;
+            check(same, "camera.bf", camera.bf, "stereo_m times camera.fx")?;
+        }
         check((0.0..=20.0).contains(&self.hand_shake), "hand_shake", self.hand_shake, "between 0 and 20")?;
         let light = &self.light;
         check(light.shadow_rays <= 1024, "light.shadow_rays", light.shadow_rays, "at most 1024")?;

@@ -1,4 +1,4 @@
-//! A synthetic dynamic world: RGB-D sequences with people that move, and exact ground truth.
+//! A synthetic dynamic world: RGB-D and stereo sequences with people that move, and exact ground truth.
 //!
 //! ```text
 //! WorldConfig ─► scene ─► textures, light maps ─┐
@@ -28,6 +28,9 @@
 //! | `halfsphere` | on a sphere of 0.55 m radius, looking at its centre | 7.69 m in 35.8 s (`walking_halfsphere`) |
 //! | `drive` | along the scene's round, 0.85 m above the floor, as on a wheeled robot | 0.7 m/s, at most 34°/s |
 //! | `loop` | once around the round and 6 % past its start, carried at 1.35 m | 0.4 to 1.2 m/s, at most 40°/s |
+//!
+//! `stereo=0.11` puts a right camera 0.11 m beside the camera, in place of depth; [`World::second_view`] shows what any other camera
+//! fixed to it sees.
 //!
 //! Light can change: `flicker=` makes about half of the lamps wander in brightness and drop out, `exposure=` darkens the
 //! whole picture.

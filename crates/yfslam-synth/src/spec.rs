@@ -26,6 +26,7 @@ const KEYS: &[(&str, &str)] = &[
     ("width", "px"),
     ("height", "px"),
     ("fps", "frames per second"),
+    ("stereo", "m from the left to a right camera, such as 0.11, in place of depth; 0 is none"),
     ("shake", "hand shake, 1 is natural"),
     ("noise", "on or off: off is the perfect sensor, without any of the effects below"),
     ("blur", "ms for which the shutter is open; 0 is off"),
@@ -74,6 +75,9 @@ pub fn parse_with_camera(spec: &str, camera: Camera) -> Result<WorldConfig, Worl
             pair.split_once('=').ok_or_else(|| fail(format!("`{pair}` is not of the form key=value")))?;
         set(&mut config, key, value).map_err(fail)?;
     }
+    if config.stereo_m > 0.0 {
+        config.camera.bf = config.stereo_m * config.camera.fx;
+    }
     config.validate().map_err(|error| fail(error.to_string()))?;
     Ok(config)
 }
@@ -108,6 +112,7 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
             camera.height = height;
         }
         "fps" => camera.fps = number(key, value)?,
+        "stereo" => config.stereo_m = number(key, value)?,
         "shake" => config.hand_shake = number(key, value)?,
         "noise" => {
             if !switch(key, value)? {
@@ -188,6 +193,16 @@ mod tests {
         assert!((on.exposure_s - 0.02).abs() < 1e-12 && (on.depth_offset_s + 0.012).abs() < 1e-12);
         assert!(on.auto_exposure > 0.0 && on.holes && on.min_return > 0.0);
         assert!(message("walking_xyz?offset_ms=5000").contains("between -1 and 1 s"));
+    }
+
+    #[test]
+    fn a_stereo_camera_has_its_own_baseline_and_no_distortion() {
+        let camera = parse("walking_xyz?stereo=0.2&width=320").unwrap().camera;
+        assert!((camera.bf - 0.2 * 267.7).abs() < 1e-9, "{}", camera.bf);
+        assert!(message("walking_xyz?stereo=-1").contains("between 0 and 2 m"));
+        let bent = Camera { distortion: [0.1, 0.0, 0.0, 0.0, 0.0], ..default_camera() };
+        let error = parse_with_camera("walking_xyz?stereo=0.11", bent).unwrap_err().to_string();
+        assert!(error.contains("zero for a stereo camera"), "{error}");
     }
 
     #[test]

@@ -122,8 +122,13 @@ impl World {
         let (time, t_world_cam) = (self.seconds(index), self.pose(index));
         let picture = self.render(&self.rays, time, &t_world_cam);
         let noise = hash(self.config.seed, 0x4015_e000 + index as u64);
-        let color = self.expose(&picture, time, hash(noise, 0));
-        let depth = self.measure(&picture, time, hash(noise, 1));
+        let color = self.expose(&self.rays, &picture, time, &Isometry3::identity(), hash(noise, 0));
+        let mount = Isometry3::translation(self.config.stereo_m, 0.0, 0.0);
+        let right = (self.config.stereo_m > 0.0).then(|| self.second(&self.rays, index, &mount));
+        let depth = match right {
+            Some(_) => DepthImage { raw: Image::new(self.rays.width, self.rays.height), metres_per_unit: 1.0 },
+            None => self.measure(&picture, time, hash(noise, 1)),
+        };
         let (width, height) = (self.rays.width, self.rays.height);
         let boxes = self.boxes(&picture.instance);
         let detections = self.config.detections.then(|| {
@@ -135,6 +140,7 @@ impl World {
                 timestamp_ns: to_ns(time),
                 color: Arc::new(color),
                 depth: Arc::new(depth),
+                right: right.map(Arc::new),
                 detections,
                 mask: None,
             },
@@ -143,6 +149,18 @@ impl World {
             exact_depth: image(width, height, picture.depth),
             boxes,
         }
+    }
+
+    /// What a second camera sees at the time of frame `index`, which is fixed to the first: `mount` is the pose of its frame in that of
+    /// the first, `camera` its lens, distortion included.
+    pub fn second_view(&self, index: usize, camera: &Camera, mount: &Isometry3<f64>) -> RgbImage {
+        self.second(&RayTable::new(camera), index, mount)
+    }
+
+    fn second(&self, rays: &RayTable, index: usize, mount: &Isometry3<f64>) -> RgbImage {
+        let time = self.seconds(index);
+        let picture = self.render(rays, time, &(self.pose(index) * mount));
+        self.expose(rays, &picture, time, mount, hash(hash(self.config.seed, 0x4015_e000 + index as u64), 2))
     }
 
     fn seconds(&self, index: usize) -> f64 {
@@ -166,13 +184,13 @@ impl World {
         render::render(rays, &t_cam_world, &view, self.config.antialias)
     }
 
-    /// The colour image: blur, gain, development.
-    fn expose(&self, picture: &Picture, time: f64, seed: u64) -> RgbImage {
-        let (sensor, (width, height)) = (&self.config.sensor, (self.rays.width, self.rays.height));
+    /// The colour image of a camera mounted at `mount` on the first, which sets the exposure of both: blur, gain, development.
+    fn expose(&self, rays: &RayTable, picture: &Picture, time: f64, mount: &Isometry3<f64>, seed: u64) -> RgbImage {
+        let (sensor, (width, height)) = (&self.config.sensor, (rays.width, rays.height));
         let gain = self.config.light.exposure * self.meter.gain(time, |at| self.brightness(at));
         let smeared = (sensor.exposure_s > 0.0).then(|| {
-            let [open, close] = [-0.5, 0.5].map(|part| self.path.pose(time + part * sensor.exposure_s));
-            sensor::blur::smear(&picture.color, &picture.depth, &self.rays, &CameraMove::between(&open, &close))
+            let [open, close] = [-0.5, 0.5].map(|part| self.path.pose(time + part * sensor.exposure_s) * mount);
+            sensor::blur::smear(&picture.color, &picture.depth, rays, &CameraMove::between(&open, &close))
         });
         let linear = smeared.as_ref().unwrap_or(&picture.color);
         sensor::color::develop(linear, width, height, gain, sensor.color_noise, seed)

@@ -419,3 +419,39 @@ fn depth_that_lags_a_frame_behind_is_the_depth_of_the_next_frame_and_says_so() {
     let differ = depths.filter(|(a, b)| a.abs_diff(**b) > 1).count();
     assert!(differ < 20, "{differ} pixels differ");
 }
+
+/// Bilinear grey at a position between pixels.
+fn grey_between(image: &yfslam::image::RgbImage, u: f64, y: usize) -> Option<f64> {
+    let grey = |x: usize| Some(image.get(x, y)?.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0);
+    let x = u.floor();
+    (x >= 0.0).then(|| Some(grey(x as usize)? * (1.0 - u + x) + grey(x as usize + 1)? * (u - x)))?
+}
+
+#[test]
+fn a_point_lies_as_far_to_the_left_in_the_right_picture_as_baseline_and_depth_say() {
+    let config = config("walking_xyz?people=1&stereo=0.11");
+    let bf = 0.11 * config.camera.fx;
+    let shot = World::new(&config).unwrap().frame(40);
+    let right = shot.frame.right.as_ref().unwrap();
+    assert!(shot.frame.depth.raw.data().iter().all(|&raw| raw == 0), "a stereo camera has no depth image");
+    // Sum of squared differences where the pictures are laid upon each other by the disparity and a bit more.
+    let differ = |more: f64| {
+        let (mut sum, mut count) = (0.0, 0);
+        for y in 0..240 {
+            for x in 60..319 {
+                // Only within surfaces: at their edges one camera sees what is hidden from the other.
+                let Some(z) = depth_between(&shot, x as f64, y as f64) else { continue };
+                let there = grey_between(right, x as f64 - bf / z + more, y);
+                let Some((here, there)) = grey_between(&shot.frame.color, x as f64, y).zip(there) else { continue };
+                if (here - there).abs() < 20.0 {
+                    (sum, count) = (sum + (here - there).powi(2), count + 1);
+                }
+            }
+        }
+        assert!(count > 20_000, "{count} pixels");
+        sum / f64::from(count)
+    };
+    let [less, exact, more] = [-0.5, 0.0, 0.5].map(differ);
+    let best = 0.25 * (less - more) / (less - 2.0 * exact + more);
+    assert!(exact < 0.5 * less.min(more) && best.abs() < 0.05, "{less} {exact} {more}: {best} px off");
+}

@@ -1,4 +1,4 @@
-//! RGB-D visual SLAM for scenes in which people walk.
+//! RGB-D and stereo visual SLAM for scenes in which people walk.
 //!
 //! What a frame goes through ([`Slam::track`] has it on one page):
 //!
@@ -13,7 +13,7 @@
 //!
 //! | module | what it knows |
 //! |---|---|
-//! | [`image`], [`features`] | one image: pyramid, FAST, ORB; [`features::FrameFeatures`] adds depth, undistortion and a search grid |
+//! | [`image`], [`features`] | one image: pyramid, FAST, ORB; [`features::FrameFeatures`] adds depth, undistortion and a search grid; depth from stereo |
 //! | [`geometry`], [`camera`], [`sensor`] | rigid motions, the lens, the noise of corners and depths |
 //! | [`optimize`] | least squares: one pose, or a window of poses and points |
 //! | [`map`] | keyframes and landmarks, their invariants, the only code that changes them |
@@ -43,6 +43,7 @@
 //!     timestamp_ns: 0,
 //!     color: Arc::new(RgbImage::new(640, 480)),
 //!     depth: Arc::new(DepthImage { raw: Image::new(640, 480), metres_per_unit: 1.0 / 5000.0 }),
+//!     right: None,
 //!     detections: None,
 //!     mask: None,
 //! };
@@ -68,6 +69,7 @@ pub mod map;
 pub mod mapping;
 pub mod optimize;
 pub mod packed;
+mod right_eye;
 pub mod sensor;
 pub mod system;
 pub mod tracking;

@@ -1,7 +1,7 @@
 //! What every stage needs to know of the camera and of the noise of its features.
 
 use crate::camera::Camera;
-use crate::config::Config;
+use crate::config::{Config, DepthSource};
 use crate::features::{Feature, ImageBounds};
 use crate::geometry::Pinhole;
 use crate::optimize::residual::Measurement;
@@ -19,8 +19,8 @@ pub struct SensorModel {
     pub scale_factors: Vec<f32>,
     /// 1/σ² of a corner's position per level, px⁻².
     weights_px: Vec<f64>,
-    /// 1/σ² of the disparity, px⁻².
-    weight_disparity: f64,
+    /// 1/σ² of the disparity per level, px⁻².
+    weights_disparity: Vec<f64>,
     /// Depth up to which a feature's depth is trusted to make a landmark at once, m.
     pub close_limit_m: f64,
     /// Depth beyond which the sensor's readings are ignored, m.
@@ -33,15 +33,23 @@ impl SensorModel {
         let pinhole = Pinhole::from(camera);
         // σ_z = n z² makes the disparity bf / z uncertain by bf·n, whatever the depth.
         let sigma_disparity = camera.bf * config.depth.noise_per_m;
+        let sigma = |scale: &f32| match config.depth.source {
+            DepthSource::Stereo => config.stereo.disparity_sigma_px * f64::from(*scale),
+            DepthSource::Image | DepthSource::Motion => sigma_disparity,
+        };
         Self {
             camera: camera.clone(),
             pinhole,
             bounds: ImageBounds::of(camera),
             scale_factors: scale_factors.to_vec(),
             weights_px: scale_factors.iter().map(|s| (config.depth.corner_sigma_px * f64::from(*s)).powi(-2)).collect(),
-            weight_disparity: sigma_disparity.powi(-2),
+            weights_disparity: scale_factors.iter().map(|scale| sigma(scale).powi(-2)).collect(),
             close_limit_m: config.depth.close_limit_baselines * camera.bf / camera.fx,
-            max_depth_m: config.depth.max_m,
+            max_depth_m: match config.depth.source {
+                // The noise of a disparity already says how little a far depth tells.
+                DepthSource::Stereo => f64::INFINITY,
+                DepthSource::Image | DepthSource::Motion => config.depth.max_m,
+            },
         }
     }
 
@@ -60,12 +68,13 @@ impl SensorModel {
     #[inline]
     pub fn measurement(&self, feature: &Feature) -> Measurement {
         let depth = feature.depth_m.map(f64::from).filter(|z| *z < self.max_depth_m);
+        let at_level = |weights: &[f64]| weights.get(usize::from(feature.octave)).copied().unwrap_or(0.0);
         Measurement {
             u: f64::from(feature.u),
             v: f64::from(feature.v),
             disparity: depth.map_or(0.0, |z| self.pinhole.bf / z),
-            weight_px: self.weights_px.get(usize::from(feature.octave)).copied().unwrap_or(0.0),
-            weight_disparity: if depth.is_some() { self.weight_disparity } else { 0.0 },
+            weight_px: at_level(&self.weights_px),
+            weight_disparity: if depth.is_some() { at_level(&self.weights_disparity) } else { 0.0 },
         }
     }
 

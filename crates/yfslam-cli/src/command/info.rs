@@ -5,14 +5,15 @@ use std::path::Path;
 
 use anyhow::Result;
 use clap::Args;
+use yfslam::config::DepthSource;
 use yfslam::image::{Image, RgbImage};
 use yfslam_io::decode::{decode_color, decode_depth};
 use yfslam_io::depth::check_depth_factor;
-use yfslam_io::sequence::{AssociationReport, FrameEntry};
+use yfslam_io::sequence::{AssociationReport, FrameEntry, Layout};
 use yfslam_io::time::{format_stamp, seconds};
-use yfslam_io::{CameraSource, DepthStatistics, Sequence, TrajectoryFile};
+use yfslam_io::{CameraSource, DepthStatistics, Sequence};
 
-use crate::source::{SourceArgs, camera, open_sequence, world_camera};
+use crate::source::{SourceArgs, open_sequence, world_camera};
 use crate::terminal::{explain, print};
 
 /// Frames that are opened, evenly over the sequence.
@@ -37,12 +38,12 @@ pub fn run(args: &InfoArgs) -> Result<()> {
 }
 
 fn recorded(args: &SourceArgs) -> Result<String> {
-    let sequence = open_sequence(args)?;
+    let (sequence, camera) = open_sequence(args, DepthSource::Image)?;
     let mut text = String::new();
     writeln!(text, "{}", sequence.folder.display())?;
-    lists(&mut text, &sequence.report)?;
+    writeln!(text, "kind          {}, {}", sequence.layout.name(), sensor(sequence.depth_source))?;
+    lists(&mut text, &sequence)?;
     timing(&mut text, &sequence)?;
-    let camera = camera(args);
     images(&mut text, &sequence, camera.as_ref().ok())?;
     match &camera {
         Ok(camera) => describe_camera(&mut text, camera)?,
@@ -53,23 +54,41 @@ fn recorded(args: &SourceArgs) -> Result<String> {
     {
         writeln!(text, "masks         {} of {} frames have one", masks.found, masks.found + masks.missing)?;
     }
-    match sequence.groundtruth_path() {
-        Some(path) => truth(&mut text, &path, &sequence)?,
-        None => writeln!(text, "ground truth  none (groundtruth.txt)")?,
+    match sequence.truth.path() {
+        Some(path) => truth(&mut text, path, &sequence)?,
+        None => writeln!(text, "ground truth  none")?,
     }
     Ok(text)
 }
 
-fn lists(text: &mut String, report: &AssociationReport) -> Result<()> {
-    let AssociationReport { color_listed, depth_listed, paired, .. } = report;
-    if report.from_associations_file {
-        writeln!(text, "lists         associations.txt: {color_listed} pairs listed, {paired} usable")?;
-    } else {
-        writeln!(text, "lists         rgb.txt {color_listed}, depth.txt {depth_listed} images; {paired} pairs")?;
+/// The kind of camera.
+fn sensor(depth_source: DepthSource) -> &'static str {
+    match depth_source {
+        DepthSource::Image => "RGB-D",
+        DepthSource::Stereo => "stereo",
+        DepthSource::Motion => "monocular",
+    }
+}
+
+fn lists(text: &mut String, sequence: &Sequence) -> Result<()> {
+    let AssociationReport { color_listed, companions_listed, paired, .. } = &sequence.report;
+    let report = &sequence.report;
+    match (sequence.layout, sequence.depth_source) {
+        _ if report.from_associations_file => {
+            writeln!(text, "lists         associations.txt: {color_listed} pairs listed, {paired} usable")?;
+        }
+        (_, DepthSource::Motion) => writeln!(text, "lists         {color_listed} pictures, {paired} usable")?,
+        (Layout::Tum, DepthSource::Image) => {
+            writeln!(
+                text,
+                "lists         rgb.txt {color_listed}, depth.txt {companions_listed} images; {paired} pairs"
+            )?;
+        }
+        _ => writeln!(text, "lists         {color_listed} left, {companions_listed} right pictures; {paired} pairs")?,
     }
     for (count, what) in [
-        (report.color_unmatched, "colour images without depth in time"),
-        (report.depth_unmatched, "depth images without colour in time"),
+        (report.color_unmatched, "colour images without companion in time"),
+        (report.companions_unmatched, "companions without colour image in time"),
         (report.duplicates_skipped, "entries skipped: duplicate stamp"),
         (report.backward_skipped, "entries skipped: stamp runs backward"),
         (report.unstamped_skipped, "entries skipped: no time stamp (nan)"),
@@ -94,10 +113,11 @@ fn timing(text: &mut String, sequence: &Sequence) -> Result<()> {
         "gaps          {} longer than twice the median period of {median_ms:.1} ms; the longest is {longest_ms:.1} ms",
         info.gaps
     )?;
-    let offset = info.offset;
+    let Some(offset) = info.offset else { return Ok(()) };
     writeln!(
         text,
-        "offset        depth lags colour by {:.1} ms in the median; at most {:.1} ms apart",
+        "offset        {} by {:.1} ms in the median; at most {:.1} ms apart",
+        if sequence.depth_source == DepthSource::Stereo { "right lags left" } else { "depth lags colour" },
         seconds(offset.median_ns) * 1e3,
         seconds(offset.max_abs_ns) * 1e3
     )?;
@@ -111,18 +131,20 @@ fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>)
     let samples = sequence.entries.iter().step_by(step);
     let opened = samples.len();
     for entry in samples {
-        match open_images(entry) {
+        match open_images(entry, sequence.depth_source) {
             Ok((color, depth)) => {
-                sizes.push([color.width(), color.height(), depth.width(), depth.height()]);
-                depths.push(depth);
+                let of_depth = depth.as_ref().map(|depth| [depth.width(), depth.height()]);
+                sizes.push(([color.width(), color.height()], of_depth));
+                depths.extend(depth);
             }
             Err(fault) => faults.push(fault),
         }
     }
     sizes.sort_unstable();
     sizes.dedup();
-    for [width, height, depth_width, depth_height] in sizes {
-        writeln!(text, "images        colour {width}×{height}, depth {depth_width}×{depth_height} px")?;
+    for ([width, height], of_depth) in sizes {
+        let depth = of_depth.map_or(String::new(), |[width, height]| format!(", depth {width}×{height}"));
+        writeln!(text, "images        colour {width}×{height}{depth} px")?;
     }
     if let Some(first) = faults.first() {
         writeln!(text, "              {} of {opened} opened frames are unusable; the first: {first:#}", faults.len())?;
@@ -145,13 +167,20 @@ fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>)
     Ok(())
 }
 
-fn open_images(entry: &FrameEntry) -> Result<(RgbImage, Image<u16>)> {
-    let (mut color, mut depth) = (RgbImage::default(), Image::default());
+/// The colour image, and the depth image if that is what comes with it; a right picture is opened too.
+fn open_images(entry: &FrameEntry, depth_source: DepthSource) -> Result<(RgbImage, Option<Image<u16>>)> {
+    let (mut color, mut depth, mut right) = (RgbImage::default(), Image::default(), RgbImage::default());
     let read = |path: &Path| std::fs::read(path).map_err(|error| anyhow::anyhow!("{}: {error}", path.display()));
     let fault = |path: &Path, error| anyhow::anyhow!("{} {error}", path.display());
     decode_color(&read(&entry.color_path)?, None, &mut color).map_err(|e| fault(&entry.color_path, e))?;
-    decode_depth(&read(&entry.depth_path)?, None, &mut depth).map_err(|e| fault(&entry.depth_path, e))?;
-    Ok((color, depth))
+    let Some(companion) = &entry.companion else { return Ok((color, None)) };
+    let bytes = read(&companion.path)?;
+    if depth_source == DepthSource::Image {
+        decode_depth(&bytes, None, &mut depth).map_err(|e| fault(&companion.path, e))?;
+        return Ok((color, Some(depth)));
+    }
+    decode_color(&bytes, None, &mut right).map_err(|e| fault(&companion.path, e))?;
+    Ok((color, None))
 }
 
 fn describe_camera(text: &mut String, source: &CameraSource) -> Result<()> {
@@ -168,7 +197,7 @@ fn describe_camera(text: &mut String, source: &CameraSource) -> Result<()> {
 }
 
 fn truth(text: &mut String, path: &Path, sequence: &Sequence) -> Result<()> {
-    let poses = match TrajectoryFile::read(path) {
+    let poses = match sequence.truth.read(path) {
         Ok(file) => file.poses,
         Err(error) => return Ok(writeln!(text, "ground truth  not usable: {error}")?),
     };
@@ -203,6 +232,8 @@ fn synthetic(args: &SourceArgs) -> Result<String> {
         "frames        {frames} in {:.3} s, {hz} Hz, rendered as they are played",
         (frames as f64 - 1.0) / hz
     )?;
+    let depth_source = if config.stereo_m > 0.0 { DepthSource::Stereo } else { DepthSource::Image };
+    writeln!(text, "kind          synthetic world, {}", sensor(depth_source))?;
     writeln!(text, "people        {}, who shall cover {share_percent:.0} % of the picture", config.people)?;
     describe_camera(&mut text, &world_camera(&config))?;
     writeln!(text, "ground truth  exact")?;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Command, FromArgMatches};
 use yfslam::Config;
+use yfslam::config::DepthSource;
 use yfslam::dynamic::Method;
 use yfslam_eval::TableStyle;
 
@@ -93,8 +94,8 @@ pub struct RunArgs {
     /// Write `report.html`: errors, trajectory, pictures and times on one page that needs no network.
     #[arg(long, help_heading = "Output")]
     report: bool,
-    /// True trajectory in TUM format to judge the result by [default: groundtruth.txt in the folder, if it is there]. The estimator
-    /// never sees it.
+    /// True trajectory to judge the result by, in TUM format or that of the folder's layout [default: groundtruth.txt, or EuRoC's or
+    /// KITTI's own, if it is there]. The estimator never sees it.
     #[arg(long, value_name = "FILE", help_heading = "Evaluation")]
     groundtruth: Option<PathBuf>,
     #[command(flatten)]
@@ -102,11 +103,17 @@ pub struct RunArgs {
 }
 
 pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
-    let config = args.settings.resolve()?;
+    let mut config = args.settings.resolve()?;
     let methods = args.methods(&config)?;
     let max_diff_ns = args.matching.max_diff_ns()?;
     let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
-    let mut source = args.source.open(boxes.is_source().then_some(&*config.dynamic.movable))?;
+    let mut source = args.source.open(config.depth.source, boxes.is_source().then_some(&*config.dynamic.movable))?;
+    config.depth.source = source.depth_source;
+    ensure!(
+        !args.dense || config.depth.source == DepthSource::Image,
+        "--dense needs depth images, which {} does not have or --sensor leaves unused; leave it out",
+        source.name
+    );
     if let Some(masks) = &source.masks {
         tell(masks, terminal);
     }
@@ -215,7 +222,7 @@ fn lanes(
 
 /// A broken ground truth ends the run if it was asked for; one that merely lies in the folder is passed over.
 fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Option<Truth>> {
-    match source.truth(&args.source, args.groundtruth.as_deref(), terminal) {
+    match source.truth(args.groundtruth.as_deref(), terminal) {
         Err(error) if args.groundtruth.is_none() => {
             terminal.warn(&format!("no evaluation: {}", explain(&error)));
             Ok(None)

@@ -22,17 +22,19 @@ Examples:
   yfslam synth --list
   yfslam synth walking_xyz --out walk && yfslam run walk
   yfslam synth 'sitting_rpy?seed=7&frames=900' --camera tum1 --out sit
+  yfslam synth 'walking_xyz?stereo=0.11' --out pairs          a stereo camera, 0.11 m from left to right
   yfslam synth walking_static --fault covered@2+1 --fault nan-stamp@5+0.5 --out faulty
 
 In the folder:
   rgb/ depth/ rgb.txt depth.txt associations.txt   as the TUM RGB-D benchmark has them
+  right/ right.txt                                 in place of depth, of a stereo camera
   groundtruth.txt  the exact pose of every frame, whatever faults were put in
   camera.toml      the camera
   boxes.json       class, instance and exact box of everything that can move; `yfslam run` takes them where no --detector is given
   masks/           per frame, named by its time: 0 where the world stands still, else the instance; for `yfslam run --masks`
   world.toml       every setting of the world";
 
-/// Write a synthetic world to a folder: colour, depth, exact poses, boxes and masks.
+/// Write a synthetic world to a folder: colour, depth or right pictures, exact poses, boxes and masks.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct SynthArgs {
@@ -66,7 +68,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
     source.camera.clone_from(&args.camera);
     let config = source.world()?;
     // Before the long work: the folder may be in use.
-    let mut writer = RecordingWriter::create(out, args.force)?;
+    let mut writer = RecordingWriter::create(out, config.stereo_m > 0.0, args.force)?;
     let world = World::new(&config)?;
     let mut progress = Progress::new(terminal, "rendering", world.len());
     let mut injector = FaultInjector::new(args.faults.clone(), world.timestamp_ns(0));
@@ -89,7 +91,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
         deliveries.par_iter().enumerate().try_for_each(|(k, d)| writer.write_images(number + k, &d.frame))?;
         for delivery in &deliveries {
             let stamp = delivery.has_stamp.then_some(delivery.frame.timestamp_ns);
-            writer.list(number, ListedStamps { color_ns: stamp, depth_ns: stamp.map(|ns| ns + offset_ns) });
+            writer.list(number, ListedStamps { color_ns: stamp, companion_ns: stamp.map(|ns| ns + offset_ns) });
             number += 1;
         }
         progress.frames(end, String::new);

@@ -1,9 +1,10 @@
-//! Recorded sequences in TUM RGB-D or Bonn layout.
+//! Recorded sequences: folders in TUM RGB-D, Bonn, EuRoC or KITTI odometry layout.
 
 use std::io::ErrorKind;
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
+use yfslam::config::DepthSource;
 use yfslam::{Camera, Detection, RgbdFrame};
 use yfslam_io::boxes::KnownDetections;
 use yfslam_io::camera::check_camera;
@@ -22,9 +23,9 @@ use crate::pipeline::Stages;
 const PROBES: usize = 30;
 
 /// Opens the folder, finds its camera and checks both against the first frames; reads its boxes of the classes that `own_boxes` names.
-pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
-    let sequence = open_sequence(args)?;
-    let camera = camera(args)?;
+pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Source> {
+    let (sequence, camera) = open_sequence(args, configured)?;
+    let camera = camera?;
     if !camera.unused_keys.is_empty() {
         tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "not used of the camera file");
     }
@@ -41,9 +42,11 @@ pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
     Ok(Source {
         name: name(args),
         camera,
-        frames: Frames::new(Player::Folder(stream, Box::new(known)), args, &stamps_ns),
+        depth_source: sequence.depth_source,
+        frames: Frames::new(Player::Folder(stream, Box::new(known)), sequence.depth_source, args, &stamps_ns),
         stamps_ns,
         association: Some(sequence.report),
+        truth_reader: Some(sequence.truth),
         masks: tally,
         mirror: sequence.mirror,
     })
@@ -61,30 +64,38 @@ fn check(sequence: &Sequence, camera: &Camera) -> Result<()> {
     }
 }
 
-/// Reads the lists of the folder.
+/// Reads the lists of the folder for what `configured` says of depth, if no flag does, and the camera: the one that was asked for, or the
+/// folder's.
 ///
 /// # Errors
 /// A tolerance that is none, or a folder without usable lists.
-pub fn open_sequence(args: &SourceArgs) -> Result<Sequence> {
+pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequence, Result<CameraSource>)> {
     let tolerance_ms = args.association_tolerance;
     ensure!(
         (0.0..=1e6).contains(&tolerance_ms),
         "--association-tolerance is {tolerance_ms}; give milliseconds, such as 20"
     );
     let options = SequenceOptions {
+        depth_source: args.wanted_depth_source(configured),
         association_tolerance_ns: (tolerance_ms * 1e6) as i64,
         start: args.start,
         end: args.end,
         reverse: args.reverse,
     };
-    Ok(Sequence::open(args.folder(), &options)?)
+    let mut sequence = Sequence::open(args.folder(), &options)?;
+    if args.camera.is_some() {
+        // Pictures are taken to be of that camera as they are.
+        sequence.calibration = None;
+    }
+    let camera = camera(args, &sequence);
+    Ok((sequence, camera))
 }
 
-/// The camera that was asked for, or that of the folder.
-pub fn camera(args: &SourceArgs) -> Result<CameraSource> {
-    let mut source = match &args.camera {
-        Some(spec) => load_camera(spec, Some(args.folder()))?,
-        None => detect_camera(args.folder())?,
+fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
+    let mut source = match (&args.camera, &sequence.calibration) {
+        (Some(spec), _) => load_camera(spec, Some(args.folder()))?,
+        (None, Some(calibration)) => calibration.camera.clone(),
+        (None, None) => detect_camera(args.folder())?,
     };
     if let Some(factor) = args.depth_factor {
         source.camera.depth_factor = factor;
@@ -105,7 +116,12 @@ pub fn next(stream: &mut FrameStream, known: &FolderKnowledge, stages: &mut Stag
     let frame = stream.next()?;
     let after = stream.times();
     stages.push("decode color", after.color - before.color);
-    stages.push("decode depth", after.depth - before.depth);
+    let companion = after.companion - before.companion;
+    match stream.companion() {
+        DepthSource::Image => stages.push("decode depth", companion),
+        DepthSource::Stereo => stages.push("decode right", companion),
+        DepthSource::Motion => {}
+    }
     stages.push("decode wait", after.waited - before.waited);
     let frame = frame.map_err(|error| Skip { reason: reason(&error.fault), message: error.to_string() });
     Some(frame.and_then(|frame| known.add_to(frame, stages)))

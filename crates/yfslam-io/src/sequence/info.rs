@@ -1,4 +1,4 @@
-//! Timing of a sequence: rate, gaps, and how far colour and depth images lie apart in time.
+//! Timing of a sequence: rate, gaps, and how far colour images and their companions lie apart in time.
 
 use super::{FrameEntry, Sequence};
 
@@ -15,13 +15,13 @@ pub struct SequenceInfo {
     pub max_gap_ns: i64,
     /// Gaps longer than twice the median period: frames are missing there.
     pub gaps: usize,
-    /// Depth stamp minus colour stamp.
-    pub offset: ColorDepthOffset,
+    /// Stamp of the depth image or right picture minus that of the colour image; `None` for a monocular camera.
+    pub offset: Option<CompanionOffset>,
 }
 
-/// Depth stamp minus colour stamp over a sequence, ns.
+/// Stamp of a companion minus that of its colour image over a sequence, ns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ColorDepthOffset {
+pub struct CompanionOffset {
     /// Median with its sign; far from zero means that one sensor lags.
     pub median_ns: i64,
     /// Largest absolute value.
@@ -41,18 +41,18 @@ impl Sequence {
         let stamps: Vec<i64> = self.entries.iter().map(|e| e.timestamp_ns).collect();
         let mut periods: Vec<i64> = stamps.windows(2).map(|w| w[1].saturating_sub(w[0])).collect();
         let median_period_ns = median(&mut periods);
-        let offset_ns = |e: &FrameEntry| e.depth_timestamp_ns.saturating_sub(e.timestamp_ns);
-        let mut offsets: Vec<i64> = self.entries.iter().map(offset_ns).collect();
+        let offset_ns = |e: &FrameEntry| Some(e.companion.as_ref()?.stamp_ns.saturating_sub(e.timestamp_ns));
+        let mut offsets: Vec<i64> = self.entries.iter().filter_map(offset_ns).collect();
         SequenceInfo {
             frames: stamps.len(),
             duration_ns: stamps.first().zip(stamps.last()).map_or(0, |(first, last)| last.saturating_sub(*first)),
             median_period_ns,
             max_gap_ns: periods.iter().copied().max().unwrap_or(0),
             gaps: periods.iter().filter(|&&period| period > median_period_ns.saturating_mul(2)).count(),
-            offset: ColorDepthOffset {
+            offset: (!offsets.is_empty()).then(|| CompanionOffset {
                 median_ns: median(&mut offsets),
                 max_abs_ns: offsets.iter().map(|offset| offset.saturating_abs()).max().unwrap_or(0),
-            },
+            }),
         }
     }
 }
@@ -66,17 +66,22 @@ fn median(values: &mut [i64]) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sequence::AssociationReport;
+    use crate::sequence::lists::ListedFile;
+    use crate::sequence::{AssociationReport, Layout, TruthReader};
+    use yfslam::config::DepthSource;
 
     fn sequence(stamps: &[(i64, i64)]) -> Sequence {
-        let entry = |&(timestamp_ns, depth_timestamp_ns): &(i64, i64)| FrameEntry {
+        let entry = |&(timestamp_ns, stamp_ns): &(i64, i64)| FrameEntry {
             timestamp_ns,
-            depth_timestamp_ns,
             color_path: "c".into(),
-            depth_path: "d".into(),
+            companion: Some(ListedFile { stamp_ns, path: "d".into() }),
         };
         Sequence {
             folder: ".".into(),
+            layout: Layout::Tum,
+            depth_source: DepthSource::Image,
+            calibration: None,
+            truth: TruthReader::tum("groundtruth.txt".into()),
             entries: stamps.iter().map(entry).collect(),
             report: AssociationReport::default(),
             mirror: None,
@@ -91,7 +96,7 @@ mod tests {
         assert_eq!((info.frames, info.duration_ns, info.median_period_ns), (5, 203 * ms, 33 * ms));
         assert_eq!((info.max_gap_ns, info.gaps), (104 * ms, 1));
         assert!((info.rate_hz().unwrap() - 30.303).abs() < 1e-3);
-        assert_eq!(info.offset, ColorDepthOffset { median_ns: 0, max_abs_ns: 10 * ms });
+        assert_eq!(info.offset, Some(CompanionOffset { median_ns: 0, max_abs_ns: 10 * ms }));
     }
 
     #[test]

@@ -1,23 +1,34 @@
-//! A recorded RGB-D sequence: a folder in the layout of the TUM RGB-D benchmark, which the Bonn data set shares.
+//! A recorded sequence: a folder in the layout of the TUM RGB-D benchmark, which the Bonn data set shares, or one of the stereo
+//! benchmarks EuRoC and KITTI.
 //!
 //! In: the folder and [`SequenceOptions`]. Out: the frames to play, in order, and a report of what was left out and why.
 
 mod associate;
+pub(crate) mod euroc;
 mod info;
+pub(crate) mod kitti;
+mod layout;
 pub mod lists;
 mod pairs;
+mod truth;
 
 use std::path::{Path, PathBuf};
 
+use yfslam::config::DepthSource;
+
 use crate::error::{Error, Result};
 use crate::time::TimeMirror;
-pub use info::{ColorDepthOffset, SequenceInfo};
-use pairs::{from_associations, from_lists};
+pub use info::{CompanionOffset, SequenceInfo};
+pub use layout::{Calibration, Layout};
+use lists::ListedFile;
+pub use truth::TruthReader;
 
 /// How a sequence is read and which part of it is played.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SequenceOptions {
-    /// Largest difference between the stamps of a colour and a depth image that belong together, ns.
+    /// What is read of the folder; `None` reads what it has, depth before right pictures.
+    pub depth_source: Option<DepthSource>,
+    /// Largest difference between the stamps of a colour image and its companion, ns.
     /// 20 ms is the default of the TUM RGB-D benchmark. An `associations.txt` is taken at its word.
     pub association_tolerance_ns: i64,
     /// First frame to play, counted from 0 after association.
@@ -30,21 +41,19 @@ pub struct SequenceOptions {
 
 impl Default for SequenceOptions {
     fn default() -> Self {
-        Self { association_tolerance_ns: 20_000_000, start: 0, end: None, reverse: false }
+        Self { depth_source: None, association_tolerance_ns: 20_000_000, start: 0, end: None, reverse: false }
     }
 }
 
-/// One colour image and the depth image that belongs to it.
+/// One colour image and what belongs to it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameEntry {
     /// Time of the colour image, ns; the time of the frame.
     pub timestamp_ns: i64,
     /// The colour image.
     pub color_path: PathBuf,
-    /// Time of the depth image, ns.
-    pub depth_timestamp_ns: i64,
-    /// The depth image.
-    pub depth_path: PathBuf,
+    /// The depth image or the right picture, whichever [`Sequence::depth_source`] says; `None` for a monocular camera.
+    pub companion: Option<ListedFile>,
 }
 
 /// What association found, before any part was cut out.
@@ -54,15 +63,15 @@ pub struct AssociationReport {
     pub from_associations_file: bool,
     /// Colour images listed.
     pub color_listed: usize,
-    /// Depth images listed.
-    pub depth_listed: usize,
+    /// Companions listed: depth images or right pictures.
+    pub companions_listed: usize,
     /// Pairs found.
     pub paired: usize,
-    /// Colour images without a depth image within the tolerance.
+    /// Colour images without a companion within the tolerance.
     pub color_unmatched: usize,
-    /// Depth images without a colour image within the tolerance.
-    pub depth_unmatched: usize,
-    /// Entries skipped because their stamp (or depth image) had been there already.
+    /// Companions without a colour image within the tolerance.
+    pub companions_unmatched: usize,
+    /// Entries skipped because their stamp (or companion) had been there already.
     pub duplicates_skipped: usize,
     /// Entries skipped because their stamps run backward.
     pub backward_skipped: usize,
@@ -77,16 +86,24 @@ pub struct AssociationReport {
 pub struct Sequence {
     /// The folder.
     pub folder: PathBuf,
+    /// How it is laid out.
+    pub layout: Layout,
+    /// Where depth comes from, which is what the companions are.
+    pub depth_source: DepthSource,
     /// The frames; stamps ascend strictly.
     pub entries: Vec<FrameEntry>,
     /// What was found and what was left out.
     pub report: AssociationReport,
     /// Set when the sequence is played backward.
     pub mirror: Option<TimeMirror>,
+    /// The calibration that a layout brings along; TUM folders have a camera file instead ([`detect_camera`](crate::detect_camera)).
+    pub calibration: Option<Calibration>,
+    /// Reads its ground truth.
+    pub truth: TruthReader,
 }
 
 impl Sequence {
-    /// Reads the lists of `folder`: `associations.txt` if it is there, else `rgb.txt` and `depth.txt`.
+    /// Reads the lists of `folder`. In TUM layout: `associations.txt` if it is there, else `rgb.txt` with `depth.txt` or `right.txt`.
     ///
     /// # Errors
     /// A folder without lists, a malformed line, lists without a single pair, no image file at all, or a part beyond the end.
@@ -95,34 +112,37 @@ impl Sequence {
             let problem = format!("association tolerance {} ns is negative", options.association_tolerance_ns);
             return Err(Error::argument(problem, "give a time of 0 or more, such as 20 ms"));
         }
-        let associations = folder.join("associations.txt");
-        let (mut entries, mut report) = if associations.is_file() {
-            from_associations(&associations)?
-        } else {
-            from_lists(folder, options.association_tolerance_ns)?
-        };
+        let layout = Layout::of(folder);
+        let layout::Listing { depth_source, mut entries, mut report, calibration, truth } =
+            layout.list(folder, options)?;
         for entry in &mut entries {
             entry.color_path = folder.join(&entry.color_path);
-            entry.depth_path = folder.join(&entry.depth_path);
+            if let Some(companion) = &mut entry.companion {
+                companion.path = folder.join(&companion.path);
+            }
         }
         report.paired = entries.len();
-        report.missing_files = entries.iter().filter(|e| !e.color_path.is_file() || !e.depth_path.is_file()).count();
+        report.missing_files = entries.iter().filter(|entry| entry.missing().is_some()).count();
         if let Some(first) = entries.first().filter(|_| report.missing_files == report.paired) {
-            let missing = if first.color_path.is_file() { &first.depth_path } else { &first.color_path };
+            let missing = first.missing().unwrap_or(&first.color_path);
             let problem = format!(
-                "none of its {} frames has both image files; the first missing is {}",
+                "none of its {} frames has all its image files; the first missing is {}",
                 report.paired,
                 missing.display()
             );
             return Err(Error::content(folder, problem, "unpack the images beside the lists"));
         }
         let (entries, mirror) = cut(folder, entries, options)?;
-        Ok(Self { folder: folder.into(), entries, report, mirror })
+        let folder = folder.into();
+        Ok(Self { folder, layout, depth_source, entries, report, mirror, calibration, truth })
     }
+}
 
-    /// The `groundtruth.txt` of the folder, if there is one.
-    pub fn groundtruth_path(&self) -> Option<PathBuf> {
-        Some(self.folder.join("groundtruth.txt")).filter(|path| path.is_file())
+impl FrameEntry {
+    /// The first of its files that does not exist.
+    fn missing(&self) -> Option<&Path> {
+        let companion = self.companion.iter().map(|companion| companion.path.as_path());
+        std::iter::once(self.color_path.as_path()).chain(companion).find(|path| !path.is_file())
     }
 }
 
@@ -146,7 +166,9 @@ fn cut(
         entries.reverse();
         for entry in &mut entries {
             entry.timestamp_ns = mirror.apply(entry.timestamp_ns);
-            entry.depth_timestamp_ns = mirror.apply(entry.depth_timestamp_ns);
+            if let Some(companion) = &mut entry.companion {
+                companion.stamp_ns = mirror.apply(companion.stamp_ns);
+            }
         }
     }
     Ok((entries, mirror))

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::text::read_text;
 use crate::time::format_stamp;
 
-/// Takes the pairs of an `associations.txt`; the paths are still relative to its folder.
+/// Takes the pairs of an `associations.txt`, colour and depth; the paths are still relative to its folder.
 pub fn from_associations(path: &Path) -> Result<(Vec<FrameEntry>, AssociationReport)> {
     let (pairs, unstamped_skipped) = parse_pair_list(&read_text(path)?, path)?;
     // Names decide; where they are silent the customary order holds: colour first.
@@ -22,43 +22,70 @@ pub fn from_associations(path: &Path) -> Result<(Vec<FrameEntry>, AssociationRep
     let mut report = AssociationReport {
         from_associations_file: true,
         color_listed: listed,
-        depth_listed: listed,
+        companions_listed: listed,
         unstamped_skipped,
         ..Default::default()
     };
     let kept = in_order(all, |e| e.timestamp_ns, path, &mut report)?;
     let ascending = kept.len();
     let mut depth_seen = BTreeSet::new();
-    let entries: Vec<_> = kept.into_iter().filter(|e| depth_seen.insert(e.depth_path.clone())).collect();
+    let is_new = |e: &FrameEntry| e.companion.as_ref().is_none_or(|depth| depth_seen.insert(depth.path.clone()));
+    let entries: Vec<_> = kept.into_iter().filter(is_new).collect();
     report.duplicates_skipped += ascending - entries.len();
     Ok((entries, report))
 }
 
-/// Pairs the images of `rgb.txt` and `depth.txt` by time; the paths are still relative to `folder`.
-pub fn from_lists(folder: &Path, tolerance_ns: i64) -> Result<(Vec<FrameEntry>, AssociationReport)> {
-    let (color_path, depth_path) = (folder.join("rgb.txt"), folder.join("depth.txt"));
-    if !color_path.is_file() || !depth_path.is_file() {
-        return Err(no_lists(folder));
+/// A list of images: its entries, the lines left out because they have no time, and the file that it is.
+pub struct List {
+    pub files: Vec<ListedFile>,
+    pub unstamped: usize,
+    pub path: PathBuf,
+}
+
+impl List {
+    /// Reads a list of the TUM benchmark; the paths are still relative to its folder.
+    pub fn read(path: PathBuf) -> Result<Self> {
+        let (files, unstamped) = parse_file_list(&read_text(&path)?, &path)?;
+        Ok(Self { files, unstamped, path })
     }
-    let (color, color_unstamped) = parse_file_list(&read_text(&color_path)?, &color_path)?;
-    let (depth, depth_unstamped) = parse_file_list(&read_text(&depth_path)?, &depth_path)?;
+
+    /// The entries whose stamps ascend; counts all others in `report`.
+    fn in_order(self, report: &mut AssociationReport) -> Result<Vec<ListedFile>> {
+        report.unstamped_skipped += self.unstamped;
+        in_order(self.files, |file| file.stamp_ns, &self.path, report)
+    }
+}
+
+/// Pairs the images of two lists by time; without a second one each image stands alone.
+pub fn from_lists(
+    folder: &Path,
+    color: List,
+    companions: Option<List>,
+    tolerance_ns: i64,
+) -> Result<(Vec<FrameEntry>, AssociationReport)> {
+    let listed = |list: &List| list.files.len() + list.unstamped;
     let mut report = AssociationReport {
-        color_listed: color.len() + color_unstamped,
-        depth_listed: depth.len() + depth_unstamped,
-        unstamped_skipped: color_unstamped + depth_unstamped,
+        color_listed: listed(&color),
+        companions_listed: companions.as_ref().map_or(0, listed),
         ..Default::default()
     };
-    let color = in_order(color, |f| f.stamp_ns, &color_path, &mut report)?;
-    let depth = in_order(depth, |f| f.stamp_ns, &depth_path, &mut report)?;
+    let color = color.in_order(&mut report)?;
+    let Some(companions) = companions else {
+        let alone =
+            |color: ListedFile| FrameEntry { timestamp_ns: color.stamp_ns, color_path: color.path, companion: None };
+        return Ok((color.into_iter().map(alone).collect(), report));
+    };
+    let what = if companions.path.ends_with("depth.txt") { "depth image" } else { "right picture" };
+    let companions = companions.in_order(&mut report)?;
     let stamps = |files: &[ListedFile]| files.iter().map(|f| f.stamp_ns).collect::<Vec<_>>();
-    let pairs = associate(&stamps(&color), &stamps(&depth), tolerance_ns);
+    let pairs = associate(&stamps(&color), &stamps(&companions), tolerance_ns);
     if pairs.is_empty() {
         let first = |files: &[ListedFile]| files.first().map_or(String::new(), |file| format_stamp(file.stamp_ns));
         let tolerance_ms = tolerance_ns as f64 * 1e-6;
         let problem = format!(
-            "no colour image has a depth image within {tolerance_ms:.1} ms; the first stamps are {} and {}",
+            "no colour image has a {what} within {tolerance_ms:.1} ms; the first stamps are {} and {}",
             first(&color),
-            first(&depth)
+            first(&companions)
         );
         return Err(Error::content(
             folder,
@@ -67,8 +94,8 @@ pub fn from_lists(folder: &Path, tolerance_ns: i64) -> Result<(Vec<FrameEntry>, 
         ));
     }
     report.color_unmatched = color.len() - pairs.len();
-    report.depth_unmatched = depth.len() - pairs.len();
-    Ok((pairs.into_iter().map(|(c, d)| frame_entry(color[c].clone(), depth[d].clone())).collect(), report))
+    report.companions_unmatched = companions.len() - pairs.len();
+    Ok((pairs.into_iter().map(|(c, d)| frame_entry(color[c].clone(), companions[d].clone())).collect(), report))
 }
 
 /// Refuses an empty list, drops what does not ascend in time and counts it.
@@ -91,35 +118,6 @@ fn in_order<T>(
     Ok(kept.items)
 }
 
-fn frame_entry(color: ListedFile, depth: ListedFile) -> FrameEntry {
-    FrameEntry {
-        timestamp_ns: color.stamp_ns,
-        color_path: color.path,
-        depth_timestamp_ns: depth.stamp_ns,
-        depth_path: depth.path,
-    }
-}
-
-/// Says which lists are missing and, where it can, which folder was meant.
-fn no_lists(folder: &Path) -> Error {
-    if folder.is_file() {
-        return Error::content(
-            folder,
-            "is a file, not a folder",
-            "unpack the archive and name the folder that holds rgb.txt",
-        );
-    }
-    let entries = match std::fs::read_dir(folder) {
-        Ok(entries) => entries,
-        Err(source) => return Error::read(folder, source),
-    };
-    let holds_lists = |path: &PathBuf| path.join("rgb.txt").is_file() || path.join("associations.txt").is_file();
-    let nested = entries.flatten().map(|entry| entry.path()).filter(holds_lists).min();
-    let missing: Vec<_> = ["rgb.txt", "depth.txt"].into_iter().filter(|name| !folder.join(name).is_file()).collect();
-    let problem = format!("holds no {} and no associations.txt", missing.join(", no "));
-    let cure = match nested {
-        Some(path) => format!("did you mean {}?", path.display()),
-        None => "name a folder in TUM RGB-D layout: rgb.txt and depth.txt, or associations.txt".into(),
-    };
-    Error::content(folder, problem, cure)
+fn frame_entry(color: ListedFile, companion: ListedFile) -> FrameEntry {
+    FrameEntry { timestamp_ns: color.stamp_ns, color_path: color.path, companion: Some(companion) }
 }

@@ -76,8 +76,7 @@ mod tests {
     use super::*;
 
     fn entries(count: i64) -> Arc<[FrameEntry]> {
-        let entry =
-            |t| FrameEntry { timestamp_ns: t, color_path: "c".into(), depth_timestamp_ns: t, depth_path: "d".into() };
+        let entry = |t| FrameEntry { timestamp_ns: t, color_path: "c".into(), companion: None };
         (0..count).map(entry).collect()
     }
 

@@ -22,8 +22,8 @@ impl Config {
     pub fn validate(&self) -> Result<(), ConfigError> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let share = |x: f64| (0.0..=1.0).contains(&x);
-        let (f, d, t) = (&self.features, &self.depth, &self.tracking);
-        let checks: [(&'static str, String, bool, &'static str); 17] = [
+        let (f, d, s, t) = (&self.features, &self.depth, &self.stereo, &self.tracking);
+        let checks: [(&'static str, String, bool, &'static str); 23] = [
             ("features.count", f.count.to_string(), f.count > 0, "at least 1"),
             ("features.levels", f.levels.to_string(), (1..=16).contains(&f.levels), "from 1 to 16"),
             (
@@ -47,6 +47,32 @@ impl Config {
                 "a positive number of baselines",
             ),
             ("depth.max_m", d.max_m.to_string(), positive(d.max_m), "a positive length in m"),
+            (
+                "stereo.right_features",
+                s.right_features.to_string(),
+                (1.0..=10.0).contains(&s.right_features),
+                "from 1 to 10",
+            ),
+            (
+                "stereo.min_depth_baselines",
+                s.min_depth_baselines.to_string(),
+                positive(s.min_depth_baselines),
+                "a positive number of baselines",
+            ),
+            (
+                "stereo.min_disparity_px",
+                s.min_disparity_px.to_string(),
+                positive(s.min_disparity_px.into()),
+                "a positive length in px",
+            ),
+            (
+                "stereo.disparity_sigma_px",
+                s.disparity_sigma_px.to_string(),
+                positive(s.disparity_sigma_px),
+                "a positive length in px",
+            ),
+            ("stereo.window_px", s.window_px.to_string(), (1..=15).contains(&s.window_px), "from 1 to 15 px"),
+            ("stereo.slide_px", s.slide_px.to_string(), (1..=30).contains(&s.slide_px), "from 1 to 30 px"),
             (
                 "dynamic.detect_every",
                 self.dynamic.detect_every.to_string(),

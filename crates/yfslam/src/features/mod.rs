@@ -11,6 +11,7 @@ pub mod matching;
 mod orb;
 mod orientation;
 mod pattern;
+pub mod stereo;
 
 pub use frame::{Feature, FrameFeatures, ImageBounds};
 pub use orb::{Features, OrbExtractor};

@@ -72,6 +72,11 @@ impl OrbExtractor {
         &self.scale_factors
     }
 
+    /// The pyramid of the last image.
+    pub(crate) fn pyramid(&self) -> &Pyramid {
+        &self.pyramid
+    }
+
     /// Changes how many features the next images are asked for.
     pub fn set_count(&mut self, count: usize) {
         self.config.count = count;

@@ -16,6 +16,11 @@ pub enum SetupError {
     /// A value of the configuration with which nothing can work.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// A stereo camera with lens distortion: points do not lie in the same row of both pictures.
+    #[error(
+        "depth.source is `stereo`, but the camera has distortion {0:?}: rectify the pictures and give the calibration without distortion"
+    )]
+    NotRectified([f64; 5]),
     /// A map made with other feature settings.
     #[error(
         "the map was made with {found} pyramid levels of scale {found_scale}, the configuration has {wanted} of {wanted_scale}: \
@@ -37,7 +42,7 @@ pub enum SetupError {
     )]
     MapCamera(usize, f64),
     /// A thread could not be started.
-    #[error("the detector's thread could not be started: {0}")]
+    #[error("a thread could not be started: {0}")]
     Thread(#[from] std::io::Error),
 }
 
@@ -49,7 +54,7 @@ pub enum FrameRejected {
         "the {image} image is {width}x{height}, the camera {camera_width}x{camera_height}: give the calibration of this size"
     )]
     Size {
-        /// Which image: colour or depth.
+        /// Which image: colour, depth, right or mask.
         image: &'static str,
         /// Its width, px.
         width: usize,
@@ -60,6 +65,12 @@ pub enum FrameRejected {
         /// The camera's height, px.
         camera_height: usize,
     },
+    /// Depth is to come from stereo, and there is no right picture.
+    #[error(
+        "the frame has no right picture, but depth.source is `stereo`: give the frames of a stereo camera, or set depth.source to \
+         `image` or `motion`"
+    )]
+    NoRightPicture,
     /// The clock did not advance.
     #[error(
         "the time stamp {timestamp_ns} ns does not come after {last_ns} ns, that of the last frame: the frame is repeated or late"

@@ -2,28 +2,31 @@
 
 mod errors;
 mod results;
+mod times;
 
 use std::sync::{Arc, PoisonError};
-use std::time::{Duration, Instant};
 
 use nalgebra::Point3;
 
-use crate::backend::{Backend, Execution, Inserted, MapOwner};
+use crate::backend::{Backend, Execution, MapOwner};
 use crate::camera::Camera;
-use crate::config::Config;
+use crate::config::{Config, DepthSource};
 use crate::detection::{Detection, Detector};
 use crate::detector_thread::DetectorThread;
 use crate::dynamic::{DynamicFilter, Evidence, FirstPose};
 use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
-use crate::image::{GrayImage, gray_from_rgb};
+use crate::image::{DepthImage, GrayImage, Image, gray_from_rgb};
 use crate::loops::{LoopClosed, Reach, relocalise};
 use crate::map::persist::SavedMap;
 use crate::map::{KeyFrameId, Map};
+use crate::right_eye::{METRES_PER_UNIT, RightEye};
 use crate::sensor::SensorModel;
 use crate::tracking::{TrackedFrame, Tracker, TrackingState};
 pub use errors::{FrameRejected, SetupError};
+pub use times::StageTimes;
+use times::Stopwatch;
 
 /// What became of one frame.
 #[derive(Clone, Debug)]
@@ -42,23 +45,6 @@ pub struct Tracked {
     pub loop_closed: Option<LoopClosed>,
     /// Where the time went.
     pub times: StageTimes,
-}
-
-/// Wall time of the stages of one frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StageTimes {
-    /// Grey image and feature extraction.
-    pub features: Duration,
-    /// Waiting for the detector, which ran beside feature extraction.
-    pub detector_wait: Duration,
-    /// Dynamic filter, both doors.
-    pub dynamic: Duration,
-    /// Pose from last frame and local map.
-    pub tracking: Duration,
-    /// Keyframe insertion and local bundle adjustment, where it became known; zero for most frames.
-    pub mapping: Duration,
-    /// Place recognition: loops for keyframes, the way back for frames that are lost.
-    pub places: Duration,
 }
 
 /// What becomes of a map from an earlier session.
@@ -84,6 +70,11 @@ pub struct Slam {
     sensor: Arc<SensorModel>,
     extractor: OrbExtractor,
     gray: GrayImage,
+    /// Looks at right pictures, where depth comes from those.
+    right_eye: Option<RightEye>,
+    /// The depth image of a camera that has none, or whose depth is not to be used: zero, but around features that have a depth from
+    /// stereo.
+    own_depth: Arc<DepthImage>,
     extracted: Features,
     tracker: Tracker,
     owner: MapOwner,
@@ -119,6 +110,13 @@ impl Slam {
         config.validate()?;
         let extractor = OrbExtractor::new(&config.features);
         let sensor = Arc::new(SensorModel::new(camera, &config, extractor.scale_factors()));
+        let right_eye = match config.depth.source {
+            DepthSource::Stereo if camera.distortion != [0.0; 5] => {
+                return Err(SetupError::NotRectified(camera.distortion));
+            }
+            DepthSource::Stereo => Some(RightEye::open(&config, &sensor)?),
+            DepthSource::Image | DepthSource::Motion => None,
+        };
         let config = Arc::new(config);
         let backend = Backend::new(sensor.clone(), config.clone(), Map::default());
         // A method that asks for no boxes needs no detector.
@@ -154,6 +152,11 @@ impl Slam {
             config,
             extractor,
             gray: GrayImage::default(),
+            right_eye,
+            own_depth: Arc::new(DepthImage {
+                raw: Image::new(camera.width, camera.height),
+                metres_per_unit: METRES_PER_UNIT,
+            }),
             extracted: Features::default(),
             tracker: Tracker::default(),
             state: TrackingState::NotInitialized,
@@ -207,6 +210,7 @@ impl Slam {
         let mut clock = Stopwatch::start();
         let boxes_are_due = self.start_detector(frame);
         self.extract(frame);
+        let depth = self.depth_image(frame);
         times.features = clock.lap();
         let looked = self.collect_boxes(frame, boxes_are_due);
         times.detector_wait = clock.lap();
@@ -216,7 +220,7 @@ impl Slam {
             looked,
             mask: frame.mask.as_deref(),
             gray: &self.gray,
-            depth: &frame.depth,
+            depth: &depth,
             sensor: &self.sensor,
         };
         self.filter.before_pose(&self.config.dynamic, &evidence, features);
@@ -227,6 +231,8 @@ impl Slam {
             loop_closed = times.note(&inserted);
         }
         let tracked = match self.state {
+            // Without depth one frame makes no map.
+            TrackingState::NotInitialized if self.config.depth.source == DepthSource::Motion => false,
             TrackingState::NotInitialized => self.owner.is_free() && self.has_enough_to_start(),
             TrackingState::Tracking => {
                 let min_inliers = self.config.tracking.local_min_inliers;
@@ -295,11 +301,15 @@ impl Slam {
             ("colour", frame.color.width(), frame.color.height()),
             ("depth", frame.depth.raw.width(), frame.depth.raw.height()),
         ];
+        let right = frame.right.iter().map(|right| ("right", right.width(), right.height()));
         let mask = frame.mask.iter().map(|mask| ("mask", mask.width(), mask.height()));
-        for (image, width, height) in sizes.into_iter().chain(mask) {
+        for (image, width, height) in sizes.into_iter().chain(right).chain(mask) {
             if (width, height) != (camera_width, camera_height) {
                 return Err(FrameRejected::Size { image, width, height, camera_width, camera_height });
             }
+        }
+        if self.config.depth.source == DepthSource::Stereo && frame.right.is_none() {
+            return Err(FrameRejected::NoRightPicture);
         }
         if let Some(last_ns) = self.last_timestamp_ns.filter(|last| *last >= frame.timestamp_ns) {
             return Err(FrameRejected::Time { timestamp_ns: frame.timestamp_ns, last_ns });
@@ -343,14 +353,27 @@ impl Slam {
         }
     }
 
+    /// The depth image that all stages see.
+    fn depth_image(&self, frame: &RgbdFrame) -> Arc<DepthImage> {
+        if self.config.depth.source == DepthSource::Image { frame.depth.clone() } else { self.own_depth.clone() }
+    }
+
     /// Features of the frame with depth, undistorted.
     fn extract(&mut self, frame: &RgbdFrame) {
+        let count = self.features_wanted();
+        if let (Some(right_eye), Some(right)) = (&mut self.right_eye, &frame.right) {
+            right_eye.start(right, count);
+        }
         gray_from_rgb(&frame.color, &mut self.gray);
-        self.extractor.set_count(self.features_wanted());
+        self.extractor.set_count(count);
         self.extractor.extract(&self.gray, &mut self.extracted);
         self.tracker.begin_frame(frame.timestamp_ns);
         let current = &mut self.tracker.current;
-        current.features.fill(&self.extracted, &frame.depth, &self.sensor.camera, self.sensor.bounds);
+        let image = if self.config.depth.source == DepthSource::Image { &*frame.depth } else { &DepthImage::default() };
+        current.features.fill(&self.extracted, image, &self.sensor.camera, self.sensor.bounds);
+        if let (Some(right_eye), Some(spots)) = (&mut self.right_eye, Arc::get_mut(&mut self.own_depth)) {
+            right_eye.finish(&self.extractor, &self.extracted, &mut current.features, spots);
+        }
         current.clear_sights();
     }
 
@@ -364,12 +387,13 @@ impl Slam {
         (count * factor) as usize
     }
 
-    /// Whether the first frame has the features, and the depths, that a map needs.
+    /// Whether the frame has the features, and the depths, that a map needs.
     fn has_enough_to_start(&self) -> bool {
         let features = &self.tracker.current.features.features;
         let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
+        let by_motion = self.config.depth.source == DepthSource::Motion;
         features.len() >= self.config.tracking.init_min_features
-            && with_depth >= self.config.tracking.init_min_landmarks
+            && (by_motion || with_depth >= self.config.tracking.init_min_landmarks)
     }
 
     /// Seeks the frame of a camera that was lost in the whole map.
@@ -448,15 +472,6 @@ impl Slam {
     }
 }
 
-impl StageTimes {
-    /// Adds what a keyframe took; returns the loop that it closed.
-    fn note(&mut self, inserted: &Inserted) -> Option<LoopClosed> {
-        self.mapping += inserted.mapping;
-        self.places += inserted.places;
-        inserted.loop_closed
-    }
-}
-
 /// Compares the frame with the map by its first pose; what turns out to move is dropped, and the pose refined without it.
 fn sharpen(
     filter: &mut dyn DynamicFilter,
@@ -469,19 +484,5 @@ fn sharpen(
     if filter.after_pose(&config.dynamic, &first, &mut current.features) {
         current.drop_distrusted();
         current.refine_pose(sensor, &config.pose);
-    }
-}
-
-/// Measures consecutive stages.
-struct Stopwatch(Instant);
-
-impl Stopwatch {
-    fn start() -> Self {
-        Self(Instant::now())
-    }
-
-    fn lap(&mut self) -> Duration {
-        let now = Instant::now();
-        now.duration_since(std::mem::replace(&mut self.0, now))
     }
 }

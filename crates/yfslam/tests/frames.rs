@@ -1,0 +1,114 @@
+//! What comes with a frame besides its picture: masks of movable objects, and depth that may be left unused.
+#![allow(clippy::unwrap_used, reason = "a test may")]
+
+use std::sync::Arc;
+
+use yfslam::camera::Camera;
+use yfslam::config::DepthSource;
+use yfslam::dynamic::Method;
+use yfslam::image::{DepthImage, Image, RgbImage};
+use yfslam::system::{FrameRejected, SetupError};
+use yfslam::{Config, RgbdFrame, Slam};
+
+/// A grained picture of a wall, with a mask of the given width.
+fn frame(timestamp_ns: i64, mask_width: usize) -> RgbdFrame {
+    let grain = |i: usize| {
+        let mixed = ((i / 640 / 6 * 107 + i % 640 / 6) as u32).wrapping_mul(0x9e37_79b1);
+        ((mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b) >> 24) as u8
+    };
+    let mut raw = Image::new(640, 480);
+    raw.data_mut().fill(9000u16);
+    let mut mask = Image::new(mask_width, 480);
+    (100..400).for_each(|y| mask.row_mut(y)[..mask_width / 2].fill(1));
+    RgbdFrame {
+        timestamp_ns,
+        color: Arc::new(RgbImage::from_vec(640, 480, (0..640 * 480).map(|i| [grain(i); 3]).collect()).unwrap()),
+        depth: Arc::new(DepthImage { raw, metres_per_unit: 1.0 / 5000.0 }),
+        right: None,
+        detections: Some(Vec::new()),
+        mask: Some(Arc::new(mask)),
+    }
+}
+
+fn camera() -> Camera {
+    let (fx, fy, cx, cy) = (520.0, 520.0, 320.0, 240.0);
+    Camera { width: 640, height: 480, fx, fy, cx, cy, distortion: [0.0; 5], depth_factor: 5000.0, fps: 30.0, bf: 40.0 }
+}
+
+#[test]
+fn features_on_a_mask_are_distrusted_and_a_mask_of_another_size_is_refused() {
+    let mut config = Config::default();
+    config.dynamic.method = Method::Full;
+    let mut slam = Slam::new(config, &camera(), None).unwrap();
+    slam.track(&frame(0, 640)).unwrap();
+    let masked = |x: f32, y: f32| x < 320.0 && (100.0..400.0).contains(&y);
+    let features = &slam.last_frame().features.features;
+    let on = features.iter().filter(|f| masked(f.raw[0], f.raw[1]));
+    assert!(on.clone().count() > 50 && on.clone().all(|f| f.trust == 0.0));
+    assert!(features.iter().filter(|f| f.raw[0] > 400.0).all(|f| f.trust > 0.0));
+    let refused = slam.track(&frame(1, 320)).unwrap_err();
+    assert!(matches!(refused, FrameRejected::Size { image: "mask", width: 320, .. }), "{refused}");
+}
+
+#[test]
+fn depth_is_used_only_where_it_is_to_come_from_an_image() {
+    for (source, tracks) in [(DepthSource::Image, true), (DepthSource::Motion, false)] {
+        let mut config = Config::default();
+        config.depth.source = source;
+        config.dynamic.method = Method::None;
+        let mut slam = Slam::new(config, &camera(), None).unwrap();
+        let tracked = slam.track(&frame(0, 640)).unwrap();
+        assert_eq!(tracked.t_world_cam.is_some(), tracks, "{source:?}");
+        assert!(slam.last_frame().features.features.iter().all(|f| f.depth_m.is_some() == tracks), "{source:?}");
+    }
+}
+
+#[test]
+fn a_frame_without_a_right_picture_is_refused_where_depth_is_to_come_from_one() {
+    let mut config = Config::default();
+    config.depth.source = DepthSource::Stereo;
+    let mut slam = Slam::new(config, &camera(), None).unwrap();
+    assert_eq!(slam.track(&frame(0, 640)).unwrap_err(), FrameRejected::NoRightPicture);
+    let lens = Camera { distortion: [0.1, 0.0, 0.0, 0.0, 0.0], ..camera() };
+    let mut config = Config::default();
+    config.depth.source = DepthSource::Stereo;
+    assert!(matches!(Slam::new(config, &lens, None), Err(SetupError::NotRectified(_))));
+}
+
+/// A wall that stereo sees at 52 px of disparity and another, below, at 26 px.
+fn pair(timestamp_ns: i64) -> RgbdFrame {
+    let left = frame(timestamp_ns, 640);
+    let mut right = RgbImage::new(640, 480);
+    for y in 0..480 {
+        let disparity = if y < 240 { 52 } else { 26 };
+        let width = 640 - disparity;
+        right.row_mut(y)[..width].copy_from_slice(&left.color.row(y)[disparity..]);
+    }
+    RgbdFrame { right: Some(Arc::new(right)), mask: None, ..left }
+}
+
+#[test]
+fn stereo_depth_is_baseline_times_focal_length_by_disparity_the_same_on_every_run() {
+    let run = || {
+        let mut config = Config::default();
+        config.depth.source = DepthSource::Stereo;
+        config.dynamic.method = Method::None;
+        let camera = Camera { bf: 0.1 * 520.0, ..camera() };
+        let mut slam = Slam::new(config, &camera, None).unwrap();
+        (0..3).for_each(|k| assert!(slam.track(&pair(k)).unwrap().t_world_cam.is_some()));
+        slam.last_frame().features.features.clone()
+    };
+    let features = run();
+    assert_eq!(features, run());
+    // Patches near the step see both walls.
+    let clear = features.iter().filter(|f| (f.v - 240.0).abs() > 80.0);
+    let (mut right, mut found, mut all) = (0, 0, 0);
+    for f in clear.filter(|f| f.u > 130.0) {
+        let wanted_m = if f.v < 240.0 { 1.0 } else { 2.0 };
+        all += 1;
+        found += usize::from(f.depth_m.is_some());
+        right += usize::from(f.depth_m.is_some_and(|z| (z / wanted_m - 1.0).abs() < 0.03));
+    }
+    // Of so many like corners not always the same are chosen in both pictures.
+    assert!(found * 2 > all && right * 50 > found * 49, "{right} right of {found} found of {all}");
+}
