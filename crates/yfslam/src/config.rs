@@ -4,6 +4,7 @@
 //! [`Config::to_commented_toml`] prints the same words as comments.
 
 mod dense;
+mod monocular;
 mod validate;
 
 use serde::{Deserialize, Serialize};
@@ -11,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::dynamic::Method;
 use crate::dynamic::depth_group::Grouping;
 pub use dense::DenseConfig;
+pub use monocular::MonocularConfig;
 pub use validate::ConfigError;
 
 /// Field names and doc comments of a configuration section.
@@ -399,6 +401,8 @@ config_section! {
         bundle: BundleConfig = BundleConfig::default(),
         /// Pose-graph optimisation.
         pose_graph: PoseGraphConfig = PoseGraphConfig::default(),
+        /// A single camera.
+        monocular: MonocularConfig = MonocularConfig::default(),
         /// Dense maps.
         dense: DenseConfig = DenseConfig::default(),
     }
@@ -417,6 +421,7 @@ const SECTIONS: &[(&str, &str, FieldDocs)] = &[
     ("pose", PoseOptimizerConfig::ABOUT, PoseOptimizerConfig::FIELDS),
     ("bundle", BundleConfig::ABOUT, BundleConfig::FIELDS),
     ("pose_graph", PoseGraphConfig::ABOUT, PoseGraphConfig::FIELDS),
+    ("monocular", MonocularConfig::ABOUT, MonocularConfig::FIELDS),
     ("dense", DenseConfig::ABOUT, DenseConfig::FIELDS),
 ];
 
