@@ -135,6 +135,7 @@ impl World {
                 timestamp_ns: to_ns(time),
                 color: Arc::new(color),
                 depth: Arc::new(depth),
+                right: None,
                 detections,
                 mask: None,
             },

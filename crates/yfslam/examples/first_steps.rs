@@ -48,6 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             timestamp_ns: index as i64 * 33_333_333,
             color: Arc::new(color),
             depth: Arc::new(depth),
+            right: None,
             detections: Some(nobody),
             mask: None,
         };

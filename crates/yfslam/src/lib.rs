@@ -43,6 +43,7 @@
 //!     timestamp_ns: 0,
 //!     color: Arc::new(RgbImage::new(640, 480)),
 //!     depth: Arc::new(DepthImage { raw: Image::new(640, 480), metres_per_unit: 1.0 / 5000.0 }),
+//!     right: None,
 //!     detections: None,
 //!     mask: None,
 //! };

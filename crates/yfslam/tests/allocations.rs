@@ -79,6 +79,7 @@ fn tracking_allocates_nothing_between_keyframes(method: Method) -> Result<(), Bo
         timestamp_ns: 0,
         color: Arc::new(texture(3)),
         depth: Arc::new(DepthImage { raw, metres_per_unit: 1.0 / 5000.0 }),
+        right: None,
         detections: Some(vec![Detection { class: 0, score: 0.9, bbox }]),
         mask: None,
     };

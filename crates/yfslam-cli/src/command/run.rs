@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Command, FromArgMatches};
 use yfslam::Config;
+use yfslam::config::DepthSource;
 use yfslam::dynamic::Method;
 use yfslam_eval::TableStyle;
 
@@ -102,11 +103,17 @@ pub struct RunArgs {
 }
 
 pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
-    let config = args.settings.resolve()?;
+    let mut config = args.settings.resolve()?;
     let methods = args.methods(&config)?;
     let max_diff_ns = args.matching.max_diff_ns()?;
     let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
-    let mut source = args.source.open(boxes.is_source().then_some(&*config.dynamic.movable))?;
+    let mut source = args.source.open(config.depth.source, boxes.is_source().then_some(&*config.dynamic.movable))?;
+    config.depth.source = source.depth_source;
+    ensure!(
+        !args.dense || config.depth.source == DepthSource::Image,
+        "--dense needs depth images, which {} does not have or --sensor leaves unused; leave it out",
+        source.name
+    );
     if let Some(masks) = &source.masks {
         tell(masks, terminal);
     }

@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
+use yfslam::config::DepthSource;
 use yfslam::{Camera, Detection, RgbdFrame};
 use yfslam_io::boxes::KnownDetections;
 use yfslam_io::camera::check_camera;
@@ -22,8 +23,9 @@ use crate::pipeline::Stages;
 const PROBES: usize = 30;
 
 /// Opens the folder, finds its camera and checks both against the first frames; reads its boxes of the classes that `own_boxes` names.
-pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
+pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Source> {
     let sequence = open_sequence(args)?;
+    let depth_source = args.depth_source(configured, DepthSource::Image)?;
     let camera = camera(args)?;
     if !camera.unused_keys.is_empty() {
         tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "not used of the camera file");
@@ -41,7 +43,8 @@ pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
     Ok(Source {
         name: name(args),
         camera,
-        frames: Frames::new(Player::Folder(stream, Box::new(known)), args, &stamps_ns),
+        depth_source,
+        frames: Frames::new(Player::Folder(stream, Box::new(known)), depth_source, args, &stamps_ns),
         stamps_ns,
         association: Some(sequence.report),
         masks: tally,

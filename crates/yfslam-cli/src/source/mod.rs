@@ -8,9 +8,10 @@ mod synth;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
-use clap::Args;
+use anyhow::{Result, bail, ensure};
+use clap::{Args, ValueEnum};
 use yfslam::RgbdFrame;
+use yfslam::config::DepthSource;
 use yfslam_eval::StampedPose;
 use yfslam_io::boxes::{BOXES_FILE, KnownDetections};
 use yfslam_io::sequence::AssociationReport;
@@ -41,6 +42,9 @@ pub struct SourceArgs {
     /// the folder]. A synthetic world is rendered for it.
     #[arg(long, value_name = "PRESET|FILE")]
     pub camera: Option<String>,
+    /// What the camera measures [default: what the sequence has]. `mono` leaves depth, or the right pictures, unused.
+    #[arg(long, value_enum, value_name = "SENSOR")]
+    pub sensor: Option<SensorArg>,
     /// Depth units per metre, instead of the camera's: 5000 for TUM and Bonn, 1000 for millimetres.
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     pub depth_factor: Option<f64>,
@@ -66,12 +70,25 @@ pub struct SourceArgs {
     pub faults: Vec<Fault>,
 }
 
+/// What a camera measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SensorArg {
+    /// Colour and depth.
+    Rgbd,
+    /// Two pictures, left and right.
+    Stereo,
+    /// One picture; the scale of the trajectory is arbitrary.
+    Mono,
+}
+
 /// A sequence ready to play.
 pub struct Source {
     /// Short name, for folders and tables.
     pub name: String,
     /// The camera, checked.
     pub camera: CameraSource,
+    /// Where depth comes from.
+    pub depth_source: DepthSource,
     /// The frames, in order.
     pub frames: Frames,
     /// Stamps of all frames, also of those that will turn out unusable, ns.
@@ -105,6 +122,7 @@ pub struct Skip {
 pub struct Frames {
     player: Player,
     faults: FaultInjector,
+    depth_source: DepthSource,
 }
 
 /// What frames are made of.
@@ -123,16 +141,16 @@ struct FolderKnowledge {
 }
 
 impl Frames {
-    fn new(player: Player, args: &SourceArgs, stamps_ns: &[i64]) -> Self {
+    fn new(player: Player, depth_source: DepthSource, args: &SourceArgs, stamps_ns: &[i64]) -> Self {
         let first_ns = stamps_ns.first().copied().unwrap_or(0);
-        Self { player, faults: FaultInjector::new(args.faults.clone(), first_ns) }
+        Self { player, faults: FaultInjector::new(args.faults.clone(), first_ns), depth_source }
     }
 
     /// The next frame, or why it cannot be used; `None` at the end. Notes in `stages` what it took to get it.
     pub fn next(&mut self, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
         loop {
             if let Some(delivery) = self.faults.pop() {
-                return Some(usable(delivery));
+                return Some(usable(delivery, self.depth_source));
             }
             let frame = match &mut self.player {
                 Player::Folder(stream, known) => folder::next(stream, known, stages),
@@ -143,22 +161,22 @@ impl Frames {
                 Some(Err(skip)) => return Some(Err(skip)),
                 None => {
                     self.faults.finish();
-                    return self.faults.pop().map(usable);
+                    return self.faults.pop().map(|delivery| usable(delivery, self.depth_source));
                 }
             }
         }
     }
 }
 
-/// Refuses a frame without a time or without any depth.
-fn usable(Delivery { frame, has_stamp }: Delivery) -> Result<RgbdFrame, Skip> {
+/// Refuses a frame without a time, or without any depth where that comes from an image.
+fn usable(Delivery { frame, has_stamp }: Delivery, depth_source: DepthSource) -> Result<RgbdFrame, Skip> {
     let skip = |reason, problem: &str| {
         Err(Skip { reason, message: format!("the frame at t = {} {problem}", format_stamp(frame.timestamp_ns)) })
     };
     if !has_stamp {
         return skip("no time stamp", "came with a time stamp that is not a number");
     }
-    if frame.depth.raw.data().iter().all(|&raw| raw == 0) {
+    if depth_source == DepthSource::Image && frame.depth.raw.data().iter().all(|&raw| raw == 0) {
         return skip("no depth in any pixel", "has no depth in any pixel");
     }
     Ok(frame)
@@ -179,6 +197,7 @@ impl SourceArgs {
         Self {
             sequence,
             camera: None,
+            sensor: None,
             depth_factor: None,
             masks: None,
             association_tolerance: ASSOCIATION_TOLERANCE_MS,
@@ -189,12 +208,40 @@ impl SourceArgs {
         }
     }
 
-    /// Opens the sequence. Frames bring the boxes that the world or the folder knows, of the classes that `own_boxes` names.
+    /// Opens the sequence for what `configured` says of depth, if no flag does. Frames bring the boxes that the world or the folder
+    /// knows, of the classes that `own_boxes` names.
     ///
     /// # Errors
     /// What cannot be read, with file, value and cure.
-    pub fn open(&self, own_boxes: Option<&[String]>) -> Result<Source> {
-        if self.is_synthetic() { synth::open(self, own_boxes) } else { folder::open(self, own_boxes) }
+    pub fn open(&self, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Source> {
+        if self.is_synthetic() {
+            synth::open(self, configured, own_boxes)
+        } else {
+            folder::open(self, configured, own_boxes)
+        }
+    }
+
+    /// Where depth comes from: the flag wins over the configuration, and that, if it asks for anything special, over `offered`, what the
+    /// sequence has.
+    ///
+    /// # Errors
+    /// The sequence does not have what was asked for.
+    fn depth_source(&self, configured: DepthSource, offered: DepthSource) -> Result<DepthSource> {
+        let wanted = match self.sensor {
+            Some(SensorArg::Rgbd) => DepthSource::Image,
+            Some(SensorArg::Stereo) => DepthSource::Stereo,
+            Some(SensorArg::Mono) => DepthSource::Motion,
+            None if configured == DepthSource::Image => offered,
+            None => configured,
+        };
+        ensure!(
+            wanted == offered || wanted == DepthSource::Motion,
+            "{} has no {}; leave out --sensor {} (or depth.source in --config), or use `mono`",
+            self.sequence,
+            if wanted == DepthSource::Stereo { "right pictures" } else { "depth images" },
+            if wanted == DepthSource::Stereo { "stereo" } else { "rgbd" }
+        );
+        Ok(wanted)
     }
 
     /// The world that was named, for the camera that was asked for.

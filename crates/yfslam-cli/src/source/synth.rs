@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use yfslam::RgbdFrame;
+use yfslam::config::DepthSource;
 use yfslam_eval::StampedPose;
 use yfslam_io::CameraSource;
 use yfslam_io::time::TimeMirror;
@@ -36,8 +37,9 @@ struct Part {
 }
 
 /// Builds the world that the spec names and starts to render it.
-pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
+pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Source> {
     let mut config = args.world()?;
+    let depth_source = args.depth_source(configured, DepthSource::Image)?;
     config.detections = own_boxes.is_some();
     let count = config.frames;
     let range = args.start..args.end.unwrap_or(count).min(count);
@@ -60,7 +62,8 @@ pub fn open(args: &SourceArgs, own_boxes: Option<&[String]>) -> Result<Source> {
         name: name.into(),
         camera: world_camera(&config),
         mirror: part.mirror,
-        frames: Frames::new(Player::Synth(renderer), args, &stamps_ns),
+        depth_source,
+        frames: Frames::new(Player::Synth(renderer), depth_source, args, &stamps_ns),
         stamps_ns,
         association: None,
         masks: None,

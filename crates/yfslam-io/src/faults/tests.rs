@@ -11,6 +11,7 @@ fn frame(k: i64) -> RgbdFrame {
         timestamp_ns: 7_000_000_000 + k * 100_000_000,
         color: Arc::new(color),
         depth: Arc::new(DepthImage { raw, metres_per_unit: 0.0002 }),
+        right: None,
         detections: Some(vec![Detection { class: 0, score: 1.0, bbox }]),
         mask: None,
     }

@@ -94,7 +94,9 @@ impl Iterator for FrameStream {
         self.times.depth += depth.took;
         let frame = color.image.and_then(|color| Ok((color, depth.image?)));
         Some(match frame {
-            Ok((color, depth)) => Ok(RgbdFrame { timestamp_ns, color, depth, detections: None, mask: None }),
+            Ok((color, depth)) => {
+                Ok(RgbdFrame { timestamp_ns, color, depth, right: None, detections: None, mask: None })
+            }
             Err(fault) => Err(FrameError { index, timestamp_ns, fault }),
         })
     }

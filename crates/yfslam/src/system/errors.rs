@@ -49,7 +49,7 @@ pub enum FrameRejected {
         "the {image} image is {width}x{height}, the camera {camera_width}x{camera_height}: give the calibration of this size"
     )]
     Size {
-        /// Which image: colour or depth.
+        /// Which image: colour, depth, right or mask.
         image: &'static str,
         /// Its width, px.
         width: usize,
@@ -60,6 +60,12 @@ pub enum FrameRejected {
         /// The camera's height, px.
         camera_height: usize,
     },
+    /// Depth is to come from stereo, and there is no right picture.
+    #[error(
+        "the frame has no right picture, but depth.source is `stereo`: give the frames of a stereo camera, or set depth.source to \
+         `image` or `motion`"
+    )]
+    NoRightPicture,
     /// The clock did not advance.
     #[error(
         "the time stamp {timestamp_ns} ns does not come after {last_ns} ns, that of the last frame: the frame is repeated or late"

@@ -10,14 +10,14 @@ use nalgebra::Point3;
 
 use crate::backend::{Backend, Execution, Inserted, MapOwner};
 use crate::camera::Camera;
-use crate::config::Config;
+use crate::config::{Config, DepthSource};
 use crate::detection::{Detection, Detector};
 use crate::detector_thread::DetectorThread;
 use crate::dynamic::{DynamicFilter, Evidence, FirstPose};
 use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
-use crate::image::{GrayImage, gray_from_rgb};
+use crate::image::{DepthImage, GrayImage, Image, gray_from_rgb};
 use crate::loops::{LoopClosed, Reach, relocalise};
 use crate::map::persist::SavedMap;
 use crate::map::{KeyFrameId, Map};
@@ -84,6 +84,8 @@ pub struct Slam {
     sensor: Arc<SensorModel>,
     extractor: OrbExtractor,
     gray: GrayImage,
+    /// The depth image of a camera that has none, or whose depth is not to be used.
+    no_depth: Arc<DepthImage>,
     extracted: Features,
     tracker: Tracker,
     owner: MapOwner,
@@ -154,6 +156,7 @@ impl Slam {
             config,
             extractor,
             gray: GrayImage::default(),
+            no_depth: Arc::new(DepthImage { raw: Image::new(camera.width, camera.height), metres_per_unit: 1.0 }),
             extracted: Features::default(),
             tracker: Tracker::default(),
             state: TrackingState::NotInitialized,
@@ -206,7 +209,8 @@ impl Slam {
         let mut times = StageTimes::default();
         let mut clock = Stopwatch::start();
         let boxes_are_due = self.start_detector(frame);
-        self.extract(frame);
+        let depth = self.depth_image(frame);
+        self.extract(frame, &depth);
         times.features = clock.lap();
         self.collect_boxes(frame, boxes_are_due);
         times.detector_wait = clock.lap();
@@ -215,7 +219,7 @@ impl Slam {
             movable: &self.movable,
             mask: frame.mask.as_deref(),
             gray: &self.gray,
-            depth: &frame.depth,
+            depth: &depth,
             sensor: &self.sensor,
         };
         self.filter.before_pose(&self.config.dynamic, &evidence, features);
@@ -226,6 +230,8 @@ impl Slam {
             loop_closed = times.note(&inserted);
         }
         let tracked = match self.state {
+            // Without depth one frame makes no map.
+            TrackingState::NotInitialized if self.config.depth.source == DepthSource::Motion => false,
             TrackingState::NotInitialized => self.owner.is_free() && self.has_enough_to_start(),
             TrackingState::Tracking => {
                 let min_inliers = self.config.tracking.local_min_inliers;
@@ -294,11 +300,15 @@ impl Slam {
             ("colour", frame.color.width(), frame.color.height()),
             ("depth", frame.depth.raw.width(), frame.depth.raw.height()),
         ];
+        let right = frame.right.iter().map(|right| ("right", right.width(), right.height()));
         let mask = frame.mask.iter().map(|mask| ("mask", mask.width(), mask.height()));
-        for (image, width, height) in sizes.into_iter().chain(mask) {
+        for (image, width, height) in sizes.into_iter().chain(right).chain(mask) {
             if (width, height) != (camera_width, camera_height) {
                 return Err(FrameRejected::Size { image, width, height, camera_width, camera_height });
             }
+        }
+        if self.config.depth.source == DepthSource::Stereo && frame.right.is_none() {
+            return Err(FrameRejected::NoRightPicture);
         }
         if let Some(last_ns) = self.last_timestamp_ns.filter(|last| *last >= frame.timestamp_ns) {
             return Err(FrameRejected::Time { timestamp_ns: frame.timestamp_ns, last_ns });
@@ -338,14 +348,19 @@ impl Slam {
         }
     }
 
+    /// The depth image that all stages see.
+    fn depth_image(&self, frame: &RgbdFrame) -> Arc<DepthImage> {
+        if self.config.depth.source == DepthSource::Image { frame.depth.clone() } else { self.no_depth.clone() }
+    }
+
     /// Features of the frame with depth, undistorted.
-    fn extract(&mut self, frame: &RgbdFrame) {
+    fn extract(&mut self, frame: &RgbdFrame, depth: &DepthImage) {
         gray_from_rgb(&frame.color, &mut self.gray);
         self.extractor.set_count(self.features_wanted());
         self.extractor.extract(&self.gray, &mut self.extracted);
         self.tracker.begin_frame(frame.timestamp_ns);
         let current = &mut self.tracker.current;
-        current.features.fill(&self.extracted, &frame.depth, &self.sensor.camera, self.sensor.bounds);
+        current.features.fill(&self.extracted, depth, &self.sensor.camera, self.sensor.bounds);
         current.clear_sights();
     }
 
@@ -359,12 +374,13 @@ impl Slam {
         (count * factor) as usize
     }
 
-    /// Whether the first frame has the features, and the depths, that a map needs.
+    /// Whether the frame has the features, and the depths, that a map needs.
     fn has_enough_to_start(&self) -> bool {
         let features = &self.tracker.current.features.features;
         let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
+        let by_motion = self.config.depth.source == DepthSource::Motion;
         features.len() >= self.config.tracking.init_min_features
-            && with_depth >= self.config.tracking.init_min_landmarks
+            && (by_motion || with_depth >= self.config.tracking.init_min_landmarks)
     }
 
     /// Seeks the frame of a camera that was lost in the whole map.
