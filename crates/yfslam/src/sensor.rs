@@ -1,7 +1,7 @@
 //! What every stage needs to know of the camera and of the noise of its features.
 
 use crate::camera::Camera;
-use crate::config::Config;
+use crate::config::{Config, DepthSource};
 use crate::features::{Feature, ImageBounds};
 use crate::geometry::Pinhole;
 use crate::optimize::residual::Measurement;
@@ -25,6 +25,8 @@ pub struct SensorModel {
     pub close_limit_m: f64,
     /// Depth beyond which the sensor's readings are ignored, m.
     max_depth_m: f64,
+    /// Whether it measures depth: without, all lengths are in a unit of their own.
+    pub measures_depth: bool,
 }
 
 impl SensorModel {
@@ -42,7 +44,14 @@ impl SensorModel {
             weight_disparity: sigma_disparity.powi(-2),
             close_limit_m: config.depth.close_limit_baselines * camera.bf / camera.fx,
             max_depth_m: config.depth.max_m,
+            measures_depth: config.depth.source != DepthSource::Motion,
         }
+    }
+
+    /// Motion along the optical axis above which it tells how the scale of what is seen changes: the baseline of the depth sensor, m.
+    /// Without one there is no length to compare with.
+    pub fn baseline(&self) -> f64 {
+        if self.measures_depth { self.pinhole.bf / self.pinhole.fx } else { f64::INFINITY }
     }
 
     /// Number of pyramid levels.

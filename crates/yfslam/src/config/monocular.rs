@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{FieldDocs, config_section};
+use super::{Config, DepthSource, FieldDocs, config_section};
 
 config_section! {
     /// A single camera without depth (`--sensor mono`). Its unit of length is arbitrary: the median depth of the first landmarks is 1.
@@ -28,7 +28,40 @@ config_section! {
         start_min_share: f64 = 0.9,
         /// Share of the winner's points that any other motion may explain: a plane often leaves two. Source: ORB-SLAM.
         start_max_rival: f64 = 0.7,
+        /// Steps of the adjustment of the two frames. Source: ORB-SLAM2.
+        start_iterations: usize = 20,
+        /// Stands in the place of `keyframes.reference_ratio`. Source: ORB-SLAM.
+        reference_ratio: f64 = 0.9,
+        /// Stands in the place of `tracking.local_radius_factor`. Source: ORB-SLAM.
+        local_radius_factor: f32 = 1.0,
+        /// Stands in the place of `mapping.triangulation_neighbours`. Source: ORB-SLAM2.
+        triangulation_neighbours: usize = 20,
+        /// Stands in the place of `mapping.min_observation_weight`: a sight without depth weighs 1. Source: ORB-SLAM2.
+        min_observation_weight: usize = 3,
+        /// Distance between two keyframes, as a share of the median depth in the older one, below which nothing is triangulated between
+        /// them. Source: ORB-SLAM.
+        min_baseline_share: f64 = 0.01,
+        /// Stands in the place of `tracking.reset_after_s` for a map of at most `tracking.reset_max_keyframes`, s. A larger one is never
+        /// left: a new one would have another scale.
+        reset_after_s: f64 = 0.5,
         /// Seed of the random draws.
         seed: u64 = 0,
+    }
+}
+
+impl Config {
+    /// The configuration as the stages use it: without depth, what section `monocular` says in the place of other keys, and no loops.
+    pub fn for_sensor(mut self) -> Self {
+        if self.depth.source == DepthSource::Motion {
+            let m = &self.monocular;
+            self.keyframes.reference_ratio = m.reference_ratio;
+            self.tracking.local_radius_factor = m.local_radius_factor;
+            self.tracking.reset_after_s = m.reset_after_s;
+            self.mapping.triangulation_neighbours = m.triangulation_neighbours;
+            self.mapping.min_observation_weight = m.min_observation_weight;
+            // A loop would have to take away the drift of the scale, too.
+            self.loops.enabled = false;
+        }
+        self
     }
 }

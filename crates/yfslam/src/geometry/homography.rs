@@ -51,7 +51,7 @@ pub fn motions_of_homography(h: &Matrix3<f64>) -> Vec<Pose> {
     let [v1, v2, v3] = order.map(|i| Vector3::from(v_t.row(i).transpose()));
     let h = h / svd.singular_values[order[1]];
     let [s1, s3] = [order[0], order[2]].map(|i| (svd.singular_values[i] / svd.singular_values[order[1]]).powi(2));
-    if !(s1 - s3 > MIN_SPREAD) {
+    if s1.is_nan() || s3.is_nan() || s1 - s3 <= MIN_SPREAD {
         return Vec::new();
     }
     let (along, across) = (((1.0 - s3).max(0.0) / (s1 - s3)).sqrt(), ((s1 - 1.0).max(0.0) / (s1 - s3)).sqrt());

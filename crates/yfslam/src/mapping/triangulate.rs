@@ -30,7 +30,12 @@ pub fn new_landmarks(
     for neighbour in neighbours {
         let (Some(a), Some(b)) = (map.keyframe(keyframe), map.keyframe(neighbour)) else { continue };
         let t_b_a = b.t_cam_world * a.t_cam_world.inverse();
-        if t_b_a.translation.vector.norm() < sensor.pinhole.bf / sensor.pinhole.fx {
+        let min_baseline = if sensor.measures_depth {
+            sensor.baseline()
+        } else {
+            config.monocular.min_baseline_share * map.median_depth(b)
+        };
+        if t_b_a.translation.vector.norm() < min_baseline {
             continue;
         }
         for (i, j) in match_along_epipolar_lines(sensor, config, a, b, &t_b_a) {

@@ -1,0 +1,150 @@
+//! The beginning of a map without depth: two frames between which the camera has moved enough (ORB-SLAM, IEEE T-RO 2015, section IV).
+//!
+//! In: frames, one after another, with the trust of their features. Out: a [`TwoViewStart`], when two of them tell both motion and points.
+//! Its unit of length is the median depth of the points in the first frame: a single camera knows no other.
+
+use std::sync::Arc;
+
+use nalgebra::Point3;
+
+use crate::config::Config;
+use crate::features::matching::RotationHistogram;
+use crate::geometry::{Pair, Pose, TwoView, reconstruct};
+use crate::image::RgbImage;
+use crate::optimize::schur::{BundleProblem, Observation};
+use crate::sensor::SensorModel;
+use crate::tracking::TrackedFrame;
+use crate::tracking::search::search_first_frame;
+
+/// A frame that is to become a keyframe, and its picture.
+#[derive(Clone, Debug)]
+pub struct StartFrame {
+    /// The frame; its pose is set.
+    pub frame: TrackedFrame,
+    /// Its picture.
+    pub color: Arc<RgbImage>,
+}
+
+/// A landmark: its feature in the first frame, that in the second, and its place in the world.
+pub type StartPoint = (usize, usize, Point3<f64>);
+
+/// Two frames that make a map.
+#[derive(Clone, Debug)]
+pub struct TwoViewStart {
+    /// The first, whose camera is the world.
+    pub first: StartFrame,
+    /// The second.
+    pub second: StartFrame,
+    /// Landmarks.
+    pub points: Vec<StartPoint>,
+}
+
+/// Waits for two frames that make a map.
+#[derive(Clone, Debug, Default)]
+pub struct Initialiser {
+    first: Option<StartFrame>,
+    /// Where each feature of the first frame was seen last, undistorted px.
+    last_seen: Vec<[f32; 2]>,
+    rotation: RotationHistogram,
+}
+
+impl Initialiser {
+    /// Forgets the first frame.
+    pub fn reset(&mut self) {
+        self.first = None;
+    }
+
+    /// Looks whether `current` and the first frame make a map. A frame that shows too little of what the first showed becomes the first.
+    pub fn see(
+        &mut self,
+        sensor: &SensorModel,
+        config: &Config,
+        current: &TrackedFrame,
+        color: &Arc<RgbImage>,
+    ) -> Option<TwoViewStart> {
+        let c = &config.monocular;
+        let Some(first) = &self.first else {
+            self.begin(config, current, color);
+            return None;
+        };
+        let matches = search_first_frame(config, &first.frame, current, &mut self.last_seen, &mut self.rotation);
+        if matches.len() < c.start_min_matches {
+            self.begin(config, current, color);
+            return None;
+        }
+        let at = |frame: &TrackedFrame, i: usize| {
+            let f = &frame.features.features[i];
+            [f.u, f.v]
+        };
+        let pairs: Vec<Pair> = matches.iter().map(|&(i, j)| (at(&first.frame, i), at(current, j))).collect();
+        let found = reconstruct(&sensor.pinhole, c, config.depth.corner_sigma_px, &pairs);
+        let adjusted = match &found {
+            Ok(found) => adjust(sensor, config, first, current, &matches, found),
+            Err(refused) => {
+                tracing::debug!(matches = matches.len(), %refused, "two frames make no map yet");
+                None
+            }
+        };
+        let (t_second_first, points) = adjusted?;
+        let mut first = self.first.take()?;
+        first.frame.t_cam_world = Pose::identity();
+        let mut second = StartFrame { frame: current.clone(), color: Arc::clone(color) };
+        second.frame.t_cam_world = t_second_first;
+        Some(TwoViewStart { first, second, points })
+    }
+
+    /// Takes a frame as the first if it has as many features as matches are needed.
+    fn begin(&mut self, config: &Config, current: &TrackedFrame, color: &Arc<RgbImage>) {
+        let trusted = current.features.features.iter().filter(|f| f.trust > 0.0 && f.octave == 0).count();
+        self.first = (trusted > config.monocular.start_min_matches)
+            .then(|| StartFrame { frame: current.clone(), color: Arc::clone(color) });
+        self.last_seen.clear();
+        self.last_seen.extend(current.features.features.iter().map(|f| [f.u, f.v]));
+    }
+}
+
+/// Bundle adjustment of the two frames; then lengths are scaled. `None` if too few points are left.
+fn adjust(
+    sensor: &SensorModel,
+    config: &Config,
+    first: &StartFrame,
+    current: &TrackedFrame,
+    matches: &[(usize, usize)],
+    found: &TwoView,
+) -> Option<(Pose, Vec<StartPoint>)> {
+    let mut problem = BundleProblem {
+        camera: sensor.pinhole,
+        poses: vec![found.t_second_first, Pose::identity()],
+        free_poses: 1,
+        points: Vec::new(),
+        observations: Vec::new(),
+    };
+    let mut features = Vec::new();
+    for (&(i, j), point) in matches.iter().zip(&found.points).filter_map(|(m, p)| Some((m, (*p)?))) {
+        let number = problem.points.len();
+        problem.points.push(point);
+        for (pose, feature) in [(0, &current.features.features[j]), (1, &first.frame.features.features[i])] {
+            let (measurement, trust) = (sensor.measurement(feature), f64::from(feature.trust));
+            problem.observations.push(Observation { pose, point: number, measurement, trust });
+        }
+        features.push((i, j));
+    }
+    problem.solve(&config.bundle, config.monocular.start_iterations, true);
+    problem.drop_outliers();
+    let fits = |number: usize| problem.observations[2 * number..2 * number + 2].iter().all(|o| o.trust > 0.0);
+    let kept: Vec<usize> = (0..features.len()).filter(|&number| fits(number)).collect();
+    let mut depths: Vec<f64> = kept.iter().map(|&number| problem.points[number].z).collect();
+    if kept.len() < config.monocular.start_min_points {
+        return None;
+    }
+    let middle = depths.len() / 2;
+    let median = *depths.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let mut t_second_first = problem.poses[0];
+    t_second_first.translation.vector /= median;
+    tracing::debug!(model = ?found.model, points = kept.len(), baseline = t_second_first.translation.vector.norm(), "two frames make a map");
+    let scaled = |number: usize| Point3::from(problem.points[number].coords / median);
+    Some((
+        t_second_first,
+        kept.iter().map(|&number| (features[number].0, features[number].1, scaled(number))).collect(),
+    ))
+}
