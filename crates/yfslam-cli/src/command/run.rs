@@ -125,7 +125,9 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
 
     let detection = shared.map_or_else(DetectionTally::default, SharedDetector::into_tally);
     let (reading, truth) = (&reading, truth.as_ref());
-    let judge_by = Judge { source: &source, truth, max_diff_ns, boxes: &boxes, reading, detection: &detection };
+    let alignment = args.matching.alignment(config.depth.source != DepthSource::Motion);
+    let judge_by =
+        Judge { source: &source, truth, max_diff_ns, alignment, boxes: &boxes, reading, detection: &detection };
     let judged = finish(args, lanes, judge_by, terminal)?;
     let run =
         |judged| Run { sequence: &args.source.sequence, source: &source, faults: &args.source.faults, truth, judged };

@@ -31,7 +31,8 @@ pub enum Model {
 pub struct TwoView {
     /// Maps points of the first camera into the second; the baseline has length 1.
     pub t_second_first: Pose,
-    /// The point of each pair in the frame of the first camera, in baselines; `None` for those that do not fit or have too little parallax.
+    /// The point of each pair in the frame of the first camera, in baselines; `None` for those that do not fit. Points with little parallax
+    /// are among them, however badly that fixes their depth.
     pub points: Vec<Option<Point3<f64>>>,
     /// Which model explained the pairs.
     pub model: Model,
@@ -43,27 +44,27 @@ pub enum Refused {
     /// Fewer pairs than a model needs, or none that fit one.
     #[error("no model fits the matches")]
     NoModel,
-    /// Too few points with parallax: the camera has hardly moved, or only turned.
-    #[error("only {points} points have parallax")]
-    LittleParallax {
-        /// Their number.
-        points: usize,
-    },
-    /// Points with parallax that contradict the best motion.
-    #[error("of {with_parallax} points with parallax only {points} fit the best motion")]
+    /// Points that are explained by the model, but by no motion.
+    #[error("the best motion explains {fitting} of {of} points")]
     Contradicted {
-        /// Points that fit.
-        points: usize,
-        /// Points that have parallax under the same motion.
-        with_parallax: usize,
+        /// Points that fit the motion.
+        fitting: usize,
+        /// Points that fit the model.
+        of: usize,
     },
-    /// Another motion explains as much: the two views of a plane leave it open.
-    #[error("two motions explain {points} and {rival} points")]
+    /// Another motion explains as much: the camera has hardly moved, or the two views of a plane leave it open.
+    #[error("two motions explain {fitting} and {rival} points")]
     Ambiguous {
         /// Points of the best motion.
-        points: usize,
+        fitting: usize,
         /// Points of the second.
         rival: usize,
+    },
+    /// Too few points with parallax: the camera has hardly moved, or only turned.
+    #[error("only {with_parallax} points have parallax")]
+    LittleParallax {
+        /// Their number.
+        with_parallax: usize,
     },
 }
 
@@ -94,18 +95,19 @@ pub fn reconstruct(
     };
     let judge = |motion: &Pose| Hypothesis::of(camera, config, variance, *motion, pairs, &fits);
     let mut hypotheses: Vec<Hypothesis> = motions.iter().map(judge).collect();
-    hypotheses.sort_by_key(|h| std::cmp::Reverse(h.count));
-    let rival = hypotheses.get(1).map_or(0, |h| h.count);
-    let Some(best) = hypotheses.into_iter().next() else { return Err(Refused::NoModel) };
-    let points = best.count;
-    if points < config.start_min_points {
-        Err(Refused::LittleParallax { points })
-    } else if (points as f64) < config.start_min_share * best.with_parallax as f64 {
-        Err(Refused::Contradicted { points, with_parallax: best.with_parallax })
-    } else if rival as f64 > config.start_max_rival * points as f64 {
-        Err(Refused::Ambiguous { points, rival })
+    hypotheses.sort_by_key(|h| std::cmp::Reverse(h.fitting));
+    let (of, rival) = (fits.iter().flatten().count(), hypotheses.get(1).map_or(0, |h| h.fitting));
+    let Some(Hypothesis { motion, points, fitting, with_parallax }) = hypotheses.into_iter().next() else {
+        return Err(Refused::NoModel);
+    };
+    if (fitting as f64) < config.start_min_share * of as f64 {
+        Err(Refused::Contradicted { fitting, of })
+    } else if rival as f64 > config.start_max_rival * fitting as f64 {
+        Err(Refused::Ambiguous { fitting, rival })
+    } else if with_parallax < config.start_min_points {
+        Err(Refused::LittleParallax { with_parallax })
     } else {
-        Ok(TwoView { t_second_first: best.motion, points: best.points, model })
+        Ok(TwoView { t_second_first: motion, points, model })
     }
 }
 
@@ -203,10 +205,11 @@ impl Candidate {
 /// A motion, and the points that speak for it.
 struct Hypothesis {
     motion: Pose,
+    /// Points that fit it: they lie before both cameras and where they were seen.
     points: Vec<Option<Point3<f64>>>,
-    /// Points that have parallax, lie before both cameras and where they were seen.
-    count: usize,
-    /// Pairs that have parallax.
+    /// Their number.
+    fitting: usize,
+    /// The number of those that have parallax.
     with_parallax: usize,
 }
 
@@ -219,27 +222,25 @@ impl Hypothesis {
         pairs: &[Pair],
         fits: &[Option<Pair>],
     ) -> Self {
-        let max_cosine = config.start_min_parallax_deg.to_radians().cos();
+        let min_parallax = config.start_min_parallax_deg.to_radians();
         let t_first_second = motion.inverse();
+        let is_seen_at = |p: Vector3<f64>, seen: &[f32; 2]| {
+            let [u, v] = camera.project(&p);
+            let error2 = (u - f64::from(seen[0])).powi(2) + (v - f64::from(seen[1])).powi(2);
+            p.z > 0.0 && error2 <= CHI2_PIXEL * variance
+        };
         let mut with_parallax = 0;
         let mut point_of = |pair: &Pair| {
             let (a, b) = (ray(camera, &pair.0), t_first_second.rotation * ray(camera, &pair.1));
-            if a.dot(&b) > max_cosine * a.norm() * b.norm() {
-                return None;
-            }
-            with_parallax += 1;
             let point = midpoint(&Vector3::zeros(), &a, &t_first_second.translation.vector, &b)?;
-            let is_seen_at = |p: Vector3<f64>, seen: &[f32; 2]| {
-                let [u, v] = camera.project(&p);
-                let error2 = (u - f64::from(seen[0])).powi(2) + (v - f64::from(seen[1])).powi(2);
-                p.z > 0.0 && error2 <= CHI2_PIXEL * variance
-            };
-            (is_seen_at(point.coords, &pair.0) && is_seen_at((motion * point).coords, &pair.1)).then_some(point)
+            let fits = is_seen_at(point.coords, &pair.0) && is_seen_at((motion * point).coords, &pair.1);
+            with_parallax += usize::from(fits && a.angle(&b) >= min_parallax);
+            fits.then_some(point)
         };
         let points: Vec<Option<Point3<f64>>> =
             pairs.iter().zip(fits).map(|(pair, fits)| fits.as_ref().and_then(|_| point_of(pair))).collect();
-        let count = points.iter().flatten().count();
-        Self { motion, points, count, with_parallax }
+        let fitting = points.iter().flatten().count();
+        Self { motion, points, fitting, with_parallax }
     }
 }
 

@@ -103,7 +103,8 @@ impl Initialiser {
     }
 }
 
-/// Bundle adjustment of the two frames; then lengths are scaled. `None` if too few points are left.
+/// Bundle adjustment of the two frames; then lengths are scaled. `None` if too few points are left, or the direction of the motion is not
+/// certain.
 fn adjust(
     sensor: &SensorModel,
     config: &Config,
@@ -131,17 +132,24 @@ fn adjust(
     }
     problem.solve(&config.bundle, config.monocular.start_iterations, true);
     problem.drop_outliers();
-    let fits = |number: usize| problem.observations[2 * number..2 * number + 2].iter().all(|o| o.trust > 0.0);
+    let sigma_deg = problem.two_view_sigma().to_degrees();
+    let min_parallax = config.monocular.start_min_parallax_deg.to_radians();
+    let second_center = problem.poses[0].inverse_transform_point(&Point3::origin());
+    let fits = |number: usize| {
+        let point = problem.points[number];
+        let is_inlier = problem.observations[2 * number..2 * number + 2].iter().all(|o| o.trust > 0.0);
+        is_inlier && point.coords.angle(&(point - second_center)) >= min_parallax
+    };
     let kept: Vec<usize> = (0..features.len()).filter(|&number| fits(number)).collect();
-    let mut depths: Vec<f64> = kept.iter().map(|&number| problem.points[number].z).collect();
-    if kept.len() < config.monocular.start_min_points {
+    tracing::debug!(model = ?found.model, points = kept.len(), sigma_deg, "two frames tell motion and points");
+    if kept.len() < config.monocular.start_min_points || sigma_deg > config.monocular.start_max_sigma_deg {
         return None;
     }
+    let mut depths: Vec<f64> = kept.iter().map(|&number| problem.points[number].z).collect();
     let middle = depths.len() / 2;
     let median = *depths.select_nth_unstable_by(middle, f64::total_cmp).1;
     let mut t_second_first = problem.poses[0];
     t_second_first.translation.vector /= median;
-    tracing::debug!(model = ?found.model, points = kept.len(), baseline = t_second_first.translation.vector.norm(), "two frames make a map");
     let scaled = |number: usize| Point3::from(problem.points[number].coords / median);
     Some((
         t_second_first,
