@@ -8,8 +8,9 @@ config_section! {
     /// A single camera without depth (`--sensor mono`). Its unit of length is arbitrary: the median depth of the first landmarks is 1.
     /// (ORB-SLAM, IEEE T-RO 2015, section IV for the start, V and VI for the rest.)
     MonocularConfig {
-        /// Features asked for until there is a map, as a multiple of `features.count`: only those of the finest level are used. ORB-SLAM has 2.
-        start_features: f64 = 4.0,
+        /// Features asked for until the map has more than `tracking.reset_max_keyframes` keyframes, as a multiple of `features.count`: it
+        /// begins with those of the finest level alone. ORB-SLAM has 2.
+        start_features: f64 = 3.0,
         /// Matches between two frames below which the start begins anew with the later one. Source: ORB-SLAM.
         start_min_matches: usize = 100,
         /// Distance within which a feature of the first frame is sought around where it was seen last, px. Source: ORB-SLAM.
@@ -22,7 +23,8 @@ config_section! {
         plane_share: f64 = 0.45,
         /// Angle between two rays to a point that fixes its depth, degrees. Source: ORB-SLAM.
         start_min_parallax_deg: f64 = 1.0,
-        /// Points with such parallax that a start needs. Source: ORB-SLAM.
+        /// Points with such parallax for which it is worth to adjust two frames; a map begins with `tracking.init_min_landmarks`.
+        /// Source: ORB-SLAM.
         start_min_points: usize = 50,
         /// Of the matches that fit a homography or a fundamental matrix the share that must fit its best motion, too: before both cameras
         /// and where they were seen. Source: ORB-SLAM.
@@ -35,6 +37,8 @@ config_section! {
         start_iterations: usize = 20,
         /// Stands in the place of `keyframes.reference_ratio`. Source: ORB-SLAM.
         reference_ratio: f64 = 0.9,
+        /// Stands in the place of `keyframes.min_observation_weight`: a new landmark is seen from two keyframes, each of which weighs 1.
+        reference_observation_weight: usize = 2,
         /// Stands in the place of `keyframes.min_frames`: points that two views fix badly want more of them soon.
         min_frames: u64 = 3,
         /// Stands in the place of `tracking.local_radius_factor`. Source: ORB-SLAM.
@@ -60,6 +64,7 @@ impl Config {
         if self.depth.source == DepthSource::Motion {
             let m = &self.monocular;
             self.keyframes.reference_ratio = m.reference_ratio;
+            self.keyframes.min_observation_weight = m.reference_observation_weight;
             self.keyframes.min_frames = m.min_frames;
             self.tracking.local_radius_factor = m.local_radius_factor;
             self.tracking.reset_after_s = m.reset_after_s;

@@ -85,6 +85,11 @@ impl Map {
         }
     }
 
+    /// Whether any keyframe measured depth: else the unit of length is arbitrary.
+    pub fn has_depths(&self) -> bool {
+        self.keyframes.values().any(|k| k.features.features.iter().any(|f| f.depth_m.is_some()))
+    }
+
     /// Median depth of the landmarks that a keyframe sees; 0 if there are none.
     pub fn median_depth(&self, keyframe: &KeyFrame) -> f64 {
         let landmarks = keyframe.sights().filter_map(|(_, id)| self.landmarks.get(id));

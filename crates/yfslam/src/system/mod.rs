@@ -195,6 +195,9 @@ impl Slam {
         if map_use == MapUse::Extend && saved.camera != self.sensor.camera {
             return Err(SetupError::MapCamera(saved.camera.width, saved.camera.fx));
         }
+        if self.sensor.measures_depth && saved.map.keyframe_count() > 0 && !saved.map.has_depths() {
+            return Err(SetupError::MapWithoutScale);
+        }
         self.first_keyframe = saved.map.keyframes_ever();
         let backend = Backend::new(self.sensor.clone(), self.config.clone(), saved.map);
         self.owner = MapOwner::new(backend, self.execution)?;
@@ -377,7 +380,8 @@ impl Slam {
         let last = &self.tracker.current.features.features;
         let trusted = last.iter().filter(|f| f.trust > 0.0).count().max(1);
         let factor = (last.len() as f64 / trusted as f64).clamp(1.0, self.config.dynamic.max_extra_features);
-        let begins = self.state == TrackingState::NotInitialized && !self.sensor.measures_depth;
+        let young = self.owner.map().keyframe_count() <= self.config.tracking.reset_max_keyframes;
+        let begins = young && !self.sensor.measures_depth;
         (count * factor * if begins { self.config.monocular.start_features } else { 1.0 }) as usize
     }
 

@@ -142,7 +142,7 @@ fn adjust(
     };
     let kept: Vec<usize> = (0..features.len()).filter(|&number| fits(number)).collect();
     tracing::debug!(model = ?found.model, points = kept.len(), sigma_deg, "two frames tell motion and points");
-    if kept.len() < config.monocular.start_min_points || sigma_deg > config.monocular.start_max_sigma_deg {
+    if kept.len() < config.tracking.init_min_landmarks || sigma_deg > config.monocular.start_max_sigma_deg {
         return None;
     }
     let mut depths: Vec<f64> = kept.iter().map(|&number| problem.points[number].z).collect();
@@ -155,4 +155,69 @@ fn adjust(
         t_second_first,
         kept.iter().map(|&number| (features[number].0, features[number].1, scaled(number))).collect(),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds};
+    use nalgebra::Vector3;
+
+    /// What a camera at `t_cam_world` sees of points of a room, from the point `from` on.
+    fn frame(sensor: &SensorModel, t_cam_world: &Pose, from: usize) -> TrackedFrame {
+        let (mut features, mut descriptors) = (Vec::new(), Vec::new());
+        for number in from..from + 300 {
+            let (u, v) = (20.0 + 30.0 * (number % 20) as f64, 20.0 + 30.0 * (number / 20 % 15) as f64);
+            let p = t_cam_world * sensor.pinhole.unproject(u, v, 2.0 + 2.0 * ((number * 37 % 101) as f64 / 101.0));
+            let [u, v] = sensor.pinhole.project(&p.coords).map(|x| x as f32);
+            features.push(Feature { raw: [u, v], u, v, octave: 0, angle_rad: 0.0, depth_m: None, trust: 1.0 });
+            let hash = |k: u64| (number as u64 * 4 + k).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            descriptors
+                .push(Descriptor([0, 1, 2, 3].map(|k| hash(k) ^ (hash(k) >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9))));
+        }
+        let bounds = ImageBounds { u_min: 0.0, u_max: 640.0, v_min: 0.0, v_max: 480.0 };
+        TrackedFrame { features: FrameFeatures::from_parts(features, descriptors, bounds), ..Default::default() }
+    }
+
+    fn see(sensor: &SensorModel, poses: &[(Pose, usize)]) -> Vec<Option<TwoViewStart>> {
+        let mut initialiser = Initialiser::default();
+        let see = |(pose, from): &(Pose, usize)| {
+            initialiser.see(sensor, &Config::default(), &frame(sensor, pose, *from), &Arc::default())
+        };
+        poses.iter().map(see).collect()
+    }
+
+    #[test]
+    fn two_views_make_a_map_whose_median_depth_is_one() {
+        let sensor = crate::map::scene::Scene::new().sensor;
+        let motion = Pose::new(Vector3::new(-0.25, 0.02, 0.05), Vector3::new(0.01, 0.03, 0.0));
+        let mut starts = see(&sensor, &[(Pose::identity(), 0), (motion, 0)]);
+        let start = starts.pop().flatten().unwrap();
+        assert!(starts[0].is_none() && start.points.len() > 250, "{}", start.points.len());
+        let mut depths: Vec<f64> = start.points.iter().map(|(.., p)| p.z).collect();
+        depths.sort_by(f64::total_cmp);
+        assert!((depths[depths.len() / 2] - 1.0).abs() < 1e-9);
+        let found = start.second.frame.t_cam_world;
+        assert!(found.rotation.angle_to(&motion.rotation) < 1e-3);
+        assert!(found.translation.vector.angle(&motion.translation.vector) < 5e-3);
+        // Depths are from 2 to 4: the median is 3 of the true unit.
+        let scale = motion.translation.vector.norm() / found.translation.vector.norm();
+        assert!((scale - 3.0).abs() < 0.1, "{scale}");
+        assert!(start.points.iter().all(|(i, j, _)| i == j));
+    }
+
+    #[test]
+    fn a_frame_that_shows_something_else_becomes_the_first() {
+        let sensor = crate::map::scene::Scene::new().sensor;
+        let moved = |x: f64| Pose::translation(x, 0.0, 0.0);
+        let starts = see(&sensor, &[(moved(0.0), 0), (moved(0.0), 1000), (moved(-0.25), 1000)]);
+        assert_eq!(starts.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, true]);
+    }
+
+    #[test]
+    fn a_motion_too_short_to_be_certain_makes_no_map() {
+        let sensor = crate::map::scene::Scene::new().sensor;
+        let starts = see(&sensor, &[(Pose::identity(), 0), (Pose::translation(-0.02, 0.0, 0.0), 0)]);
+        assert!(starts.iter().all(Option::is_none));
+    }
 }
