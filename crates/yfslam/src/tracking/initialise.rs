@@ -176,7 +176,9 @@ mod tests {
                 .push(Descriptor([0, 1, 2, 3].map(|k| hash(k) ^ (hash(k) >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9))));
         }
         let bounds = ImageBounds { u_min: 0.0, u_max: 640.0, v_min: 0.0, v_max: 480.0 };
-        TrackedFrame { features: FrameFeatures::from_parts(features, descriptors, bounds), ..Default::default() }
+        let mut frame = TrackedFrame::default();
+        frame.features = FrameFeatures::from_parts(features, descriptors, bounds);
+        frame
     }
 
     fn see(sensor: &SensorModel, poses: &[(Pose, usize)]) -> Vec<Option<TwoViewStart>> {
