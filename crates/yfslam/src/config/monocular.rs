@@ -15,21 +15,20 @@ config_section! {
         start_min_matches: usize = 100,
         /// Distance within which a feature of the first frame is sought around where it was seen last, px. Source: ORB-SLAM.
         start_radius_px: f32 = 100.0,
-        /// Ratio of best to second-best distance of a match between the two. Source: ORB-SLAM.
+        /// Ratio of best to second-best distance of a match between the two.
         start_ratio: f32 = 0.9,
-        /// Samples of eight matches that are drawn. Source: ORB-SLAM.
+        /// Samples of eight matches that are drawn: with three of ten matches wrong, eleven of them hold right ones alone.
         start_draws: usize = 200,
         /// Share of the homography in the sum of both scores above which the scene counts as a plane. Source: ORB-SLAM.
         plane_share: f64 = 0.45,
-        /// Angle between two rays to a point that fixes its depth, degrees. Source: ORB-SLAM.
+        /// Angle between two rays to a point that fixes its depth, degrees: nine times the noise of a corner.
         start_min_parallax_deg: f64 = 1.0,
         /// Points with such parallax for which it is worth to adjust two frames; a map begins with `tracking.init_min_landmarks`.
-        /// Source: ORB-SLAM.
         start_min_points: usize = 50,
         /// Of the matches that fit a homography or a fundamental matrix the share that must fit its best motion, too: before both cameras
-        /// and where they were seen. Source: ORB-SLAM.
+        /// and where they were seen.
         start_min_share: f64 = 0.9,
-        /// Share of these points that any other motion may explain: a plane often leaves two. Source: ORB-SLAM.
+        /// Share of these points that any other motion may explain: a plane often leaves two.
         start_max_rival: f64 = 0.7,
         /// Standard deviation of the direction of the motion between the two frames, degrees, above which a start waits for a wider baseline.
         start_max_sigma_deg: f64 = 3.0,
