@@ -3,22 +3,44 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use clap::Args;
-use yfslam_eval::{Delta, EvalError, EvalOptions, Evaluation, StampedPose, evaluate};
+use clap::{Args, ValueEnum};
+use yfslam_eval::{AlignmentKind, Delta, EvalError, EvalOptions, Evaluation, StampedPose, evaluate};
 use yfslam_io::TrajectoryFile;
 
 use crate::terminal::Terminal;
 
-/// How stamps of estimate and ground truth are matched.
+/// How estimate and ground truth are brought together.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct MatchArgs {
     /// How far apart the stamps of an estimated and a true pose may be, ms. The tool of the TUM benchmark takes 20, `evo` 10; the
     /// ground truth of Bonn needs 20.
     #[arg(long, value_name = "MS", default_value_t = 20.0, allow_negative_numbers = true, help_heading = "Evaluation")]
     pub max_difference_ms: f64,
+    /// What the alignment with the ground truth may choose [default: se3; sim3 for runs with a single camera].
+    #[arg(long, value_enum, value_name = "KIND", help_heading = "Evaluation")]
+    pub align: Option<AlignArg>,
+}
+
+/// What an alignment may choose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum AlignArg {
+    /// Rotation and translation, for cameras that measure lengths.
+    Se3,
+    /// The scale, too, for a single camera. It hides that scale is not known, and how it drifts on the whole.
+    Sim3,
 }
 
 impl MatchArgs {
+    /// What the alignment may choose, for an estimate that knows its scale or not.
+    pub fn alignment(self, knows_scale: bool) -> AlignmentKind {
+        match self.align {
+            Some(AlignArg::Se3) => AlignmentKind::Se3,
+            Some(AlignArg::Sim3) => AlignmentKind::Sim3,
+            None if knows_scale => AlignmentKind::Se3,
+            None => AlignmentKind::Sim3,
+        }
+    }
+
     /// The tolerance, ns.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use anyhow::Result;
 use yfslam::tracking::TrackingState;
 use yfslam::{Config, RgbdFrame, Slam};
 use yfslam_eval::report::{DenseMap, Picture};
-use yfslam_eval::{EvalError, EvalOptions, Evaluation, ExpectedFrames};
+use yfslam_eval::{AlignmentKind, EvalError, EvalOptions, Evaluation, ExpectedFrames};
 
 use crate::accuracy::{judge, to_eval};
 use crate::boxes::{BoxOrigin, DetectionTally};
@@ -50,6 +50,7 @@ pub struct Judge<'a> {
     pub source: &'a Source,
     pub truth: Option<&'a Truth>,
     pub max_diff_ns: u64,
+    pub alignment: AlignmentKind,
     /// Where the boxes come from, for methods that need any.
     pub boxes: &'a BoxOrigin,
     /// What reading the frames took.
@@ -154,7 +155,8 @@ impl Lane {
         }
         let evaluation = judge_by.truth.map(|truth| {
             let expected = ExpectedFrames::StampsNs(judge_by.source.stamps_ns.clone());
-            let options = EvalOptions { max_diff_ns: judge_by.max_diff_ns, expected, ..Default::default() };
+            let Judge { max_diff_ns, alignment, .. } = judge_by;
+            let options = EvalOptions { max_diff_ns, alignment, expected, ..Default::default() };
             judge(&truth.poses, &to_eval(&outcome.trajectory), options)
         });
         folder.write(&outcome, &config)?;

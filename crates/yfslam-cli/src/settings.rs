@@ -110,6 +110,8 @@ impl SettingsArgs {
             None => {}
         }
         dynamic.seed = self.seed.unwrap_or(dynamic.seed);
+        config.monocular.seed = self.seed.unwrap_or(config.monocular.seed);
+        let dynamic = &mut config.dynamic;
         dynamic.detect_every = self.detect_every.map_or(dynamic.detect_every, |every| every as usize);
         dynamic.detect_async |= self.detect_async;
         Ok(config)

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use anyhow::Result;
-use yfslam_eval::{Table, TableStyle, improvement_percent};
+use yfslam_eval::{AlignmentKind, Table, TableStyle, improvement_percent};
 
 use crate::boxes::BoxOrigin;
 use crate::lane::Judged;
@@ -80,8 +80,10 @@ fn places_summary(text: &mut String, places: &PlaceTally) -> Result<()> {
 
 /// The errors side by side, as in Table 2 of the paper.
 pub fn of_several(judged: &[Judged], source: &Source, truth: Option<&Truth>) -> String {
+    let kind = judged.iter().find_map(Judged::evaluation).map_or(AlignmentKind::Se3, |e| e.ate.alignment.kind);
+    let ate = format!("ATE, {kind} (m)");
     let headers =
-        ["ATE (m)", "RMSE", "S.D.", "mean", "median", "max", "improve RMSE (%)", "S.D. (%)", "frames tracked"];
+        [ate.as_str(), "RMSE", "S.D.", "mean", "median", "max", "improve RMSE (%)", "S.D. (%)", "frames tracked"];
     let mut table = Table::new(headers);
     let errors_of = |judged: &Judged| judged.evaluation().map(|e| e.ate.translation_m);
     let original = judged.first().and_then(errors_of);

@@ -38,7 +38,8 @@ fn eval_tells_the_errors_and_the_improvement() {
 
     let table = succeeds(folder.path(), &args).stdout;
     assert!(table.contains("ATE, SE(3) (m)") && table.contains("improvement (%)"), "{table}");
-    assert!(succeeds(folder.path(), &["eval", "truth.txt", "good.txt", "--scale"]).stdout.contains("; scale "));
+    let scaled = succeeds(folder.path(), &["eval", "truth.txt", "good.txt", "--align", "sim3"]).stdout;
+    assert!(scaled.contains("ATE, Sim(3) (m)") && scaled.contains("; Sim(3), scale s = "), "{scaled}");
     fails(folder.path(), &["eval", "truth.txt", "good.txt", "--delta", "1x"], &["'1x'", "1f", "0.5m"]);
     fails(folder.path(), &["eval", "truth.txt", "good.txt", "--delta", "90s"], &["90 s", "smaller"]);
     fails(folder.path(), &["eval", "truth.txt", "nowhere.txt"], &["nowhere.txt"]);

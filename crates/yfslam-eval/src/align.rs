@@ -6,6 +6,7 @@
 use crate::{EvalError, Match, StampedPose, Statistics};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Eigenvalue gap, as a fraction of the largest eigenvalue, below which the rotation is noise: 1 µm across for each metre along.
 const MIN_RELATIVE_GAP: f64 = 1e-12;
@@ -21,6 +22,15 @@ pub enum AlignmentKind {
     Se3,
     /// Rotation, translation and scale: for monocular estimates. It hides scale drift, so say so beside the figure.
     Sim3,
+}
+
+impl fmt::Display for AlignmentKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Se3 => "SE(3)",
+            Self::Sim3 => "Sim(3)",
+        })
+    }
 }
 
 /// A transform from the world of the estimate into the world of the reference: x ↦ scale · rotation · x + translation.
@@ -42,6 +52,25 @@ impl Alignment {
         let position = self.scale * (self.rotation * pose.t_world_cam.translation.vector) + self.translation;
         let rotation = self.rotation * pose.t_world_cam.rotation;
         StampedPose::new(pose.timestamp_ns, Isometry3::from_parts(position.into(), rotation))
+    }
+
+    /// The matches with the lengths of the estimate in those of the reference, for errors that need no other part of the alignment.
+    pub fn scaled(&self, matches: &[Match]) -> Vec<Match> {
+        let scaled = |pose: &StampedPose| {
+            let mut pose = *pose;
+            pose.t_world_cam.translation.vector *= self.scale;
+            pose
+        };
+        matches.iter().map(|m| Match { estimate: scaled(&m.estimate), ..*m }).collect()
+    }
+}
+
+impl fmt::Display for Alignment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.kind {
+            AlignmentKind::Se3 => write!(f, "{}", self.kind),
+            AlignmentKind::Sim3 => write!(f, "{}, scale s = {:.4}", self.kind, self.scale),
+        }
     }
 }
 

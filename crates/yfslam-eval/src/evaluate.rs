@@ -24,7 +24,7 @@ pub enum ExpectedFrames {
 pub struct EvalOptions {
     /// Largest difference between the stamps of a match, ns.
     pub max_diff_ns: u64,
-    /// Alignment before the absolute trajectory error.
+    /// Alignment before the absolute trajectory error. Its scale, if it has one, is that of the relative errors, too.
     pub alignment: AlignmentKind,
     /// Relative pose errors to compute.
     pub rpe: Vec<RpeOptions>,
@@ -79,13 +79,15 @@ pub fn evaluate(
         }
         ExpectedFrames::Count(expected) => Some(Coverage::of_count(matches.len(), *expected)?),
     };
+    let ate = ate(&matches, options.alignment)?;
+    let scaled = ate.alignment.scaled(&matches);
     Ok(Evaluation {
         reference_poses: reference.len(),
         estimate_poses: estimate.len(),
         matches: matches.len(),
         max_diff_ns: options.max_diff_ns,
-        ate: ate(&matches, options.alignment)?,
-        rpe: options.rpe.iter().map(|o| rpe(&matches, o)).collect::<Result<_, _>>()?,
+        ate,
+        rpe: options.rpe.iter().map(|o| rpe(&scaled, o)).collect::<Result<_, _>>()?,
         coverage,
     })
 }
@@ -100,11 +102,7 @@ impl Evaluation {
             let figures = [s.rmse, s.mean, s.median, s.std, s.min, s.max].map(|v| format!("{v:.4}"));
             table.push([name].into_iter().chain(figures).chain([s.count.to_string()]));
         };
-        let alignment = match self.ate.alignment.kind {
-            AlignmentKind::Se3 => "SE(3)",
-            AlignmentKind::Sim3 => "Sim(3)",
-        };
-        push(format!("ATE, {alignment} (m)"), &self.ate.translation_m);
+        push(format!("ATE, {} (m)", self.ate.alignment.kind), &self.ate.translation_m);
         for rpe in &self.rpe {
             let pairs = if rpe.options.all_pairs { "all pairs" } else { "consecutive" };
             push(format!("RPE per {}, {pairs} (m)", rpe.options.delta), &rpe.translation_m);
@@ -119,7 +117,7 @@ impl Evaluation {
             self.max_diff_ns as f64 / 1e6
         );
         if self.ate.alignment.kind == AlignmentKind::Sim3 {
-            text += &format!("; scale {:.4}", self.ate.alignment.scale);
+            text += &format!("; {}", self.ate.alignment);
         }
         if let Some(c) = &self.coverage {
             text += &format!("; tracked {} of {} frames ({:.1} %)", c.tracked, c.expected, 100.0 * c.fraction);

@@ -1,7 +1,8 @@
 //! In: matched poses. Out: the relative pose error over a span of frames, seconds or metres.
 //!
 //! For a pair (i, j) of matches with reference poses Q and estimated poses P, the error is (Qᵢ⁻¹ Qⱼ)⁻¹ (Pᵢ⁻¹ Pⱼ) (Sturm et al. 2012,
-//! §V-A): its translation is the drift in m, its rotation angle the drift in degrees, over that span; no alignment is involved.
+//! §V-A): its translation is the drift in m, its rotation angle the drift in degrees, over that span; no alignment is involved, save
+//! that the estimate of a single camera is brought to scale before ([`crate::Alignment::scaled`]).
 //!
 //! Which pairs: *all pairs* starts one at every match i, so that spans overlap; *consecutive* starts the next where the last ended.
 //!

@@ -88,6 +88,11 @@ def rows(folder):
                     command += " --all_pairs" if pairs == "all_pairs" else ""
                     result = run_evo(folder, command)
                     yield {**key, "metric": metric, "unit": unit, "delta": delta, "pairs": pairs, "command": command, **result}
+        # A monocular estimate is scaled before it is compared.
+        for unit, delta, pairs in [("f", 1, "consecutive"), ("m", 0.5, "consecutive"), ("m", 0.5, "all_pairs")]:
+            command = f"evo_rpe tum {files} -as -u {unit} -d {delta}" + (" --all_pairs" if pairs == "all_pairs" else "")
+            result = run_evo(folder, command)
+            yield {**key, "metric": "trans_part_sim3", "unit": unit, "delta": delta, "pairs": pairs, "command": command, **result}
         reference, estimate = (poses(folder / file) for file in files.split())
         for delta in [0.1, 1, 2.5]:
             for pairs in ["consecutive", "all_pairs"]:

@@ -242,6 +242,6 @@ fn an_evaluation_survives_json_and_prints_as_a_table() {
         ["error", "RMSE", "mean", "median", "S.D.", "min", "max", "n"]
     );
     assert!(ate.starts_with("ATE, Sim(3) (m)  ") && ate.ends_with("  0.0000   30"), "{text}");
-    assert!(text.ends_with("within 10 ms; scale 2.0000; tracked 30 of 40 frames (75.0 %)\n"), "{text}");
+    assert!(text.ends_with("within 10 ms; Sim(3), scale s = 2.0000; tracked 30 of 40 frames (75.0 %)\n"), "{text}");
     assert!(evaluation.table(TableStyle::Markdown).starts_with("| error "));
 }

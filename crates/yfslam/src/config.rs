@@ -5,6 +5,7 @@
 
 mod dense;
 mod depth;
+mod monocular;
 mod places;
 mod validate;
 
@@ -14,6 +15,7 @@ use crate::dynamic::Method;
 use crate::dynamic::depth_group::Grouping;
 pub use dense::DenseConfig;
 pub use depth::{DepthConfig, DepthSource, StereoConfig};
+pub use monocular::MonocularConfig;
 pub use places::{LoopConfig, PlaceConfig, PoseGraphConfig};
 pub use validate::ConfigError;
 
@@ -314,6 +316,8 @@ config_section! {
         bundle: BundleConfig = BundleConfig::default(),
         /// Pose-graph optimisation.
         pose_graph: PoseGraphConfig = PoseGraphConfig::default(),
+        /// A single camera.
+        monocular: MonocularConfig = MonocularConfig::default(),
         /// Dense maps.
         dense: DenseConfig = DenseConfig::default(),
     }
@@ -333,6 +337,7 @@ const SECTIONS: &[(&str, &str, FieldDocs)] = &[
     ("pose", PoseOptimizerConfig::ABOUT, PoseOptimizerConfig::FIELDS),
     ("bundle", BundleConfig::ABOUT, BundleConfig::FIELDS),
     ("pose_graph", PoseGraphConfig::ABOUT, PoseGraphConfig::FIELDS),
+    ("monocular", MonocularConfig::ABOUT, MonocularConfig::FIELDS),
     ("dense", DenseConfig::ABOUT, DenseConfig::FIELDS),
 ];
 

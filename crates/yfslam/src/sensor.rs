@@ -25,6 +25,8 @@ pub struct SensorModel {
     pub close_limit_m: f64,
     /// Depth beyond which the sensor's readings are ignored, m.
     max_depth_m: f64,
+    /// Whether it measures depth: without, all lengths are in a unit of their own.
+    pub measures_depth: bool,
 }
 
 impl SensorModel {
@@ -50,7 +52,14 @@ impl SensorModel {
                 DepthSource::Stereo => f64::INFINITY,
                 DepthSource::Image | DepthSource::Motion => config.depth.max_m,
             },
+            measures_depth: config.depth.source != DepthSource::Motion,
         }
+    }
+
+    /// Motion along the optical axis above which it tells how the scale of what is seen changes: the baseline of the depth sensor, m.
+    /// Without one there is no length to compare with.
+    pub fn baseline(&self) -> f64 {
+        if self.measures_depth { self.pinhole.bf / self.pinhole.fx } else { f64::INFINITY }
     }
 
     /// Number of pyramid levels.

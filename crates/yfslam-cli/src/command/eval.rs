@@ -7,8 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
 use yfslam_eval::{
-    AlignmentKind, Delta, EvalOptions, Evaluation, RpeOptions, Statistics, Table, TableStyle, evaluate,
-    improvement_percent,
+    Delta, EvalOptions, Evaluation, RpeOptions, Statistics, Table, TableStyle, evaluate, improvement_percent,
 };
 
 use crate::accuracy::{MatchArgs, judge, read_poses, to_eval};
@@ -19,7 +18,7 @@ Examples:
   yfslam eval groundtruth.txt yfslam-out/walk/trajectory.txt
   yfslam eval groundtruth.txt yf.txt --versus none.txt             how much better, equation 3 of the YF-SLAM paper
   yfslam eval groundtruth.txt live.txt --delta 1f --delta 0.5m --json
-  yfslam eval groundtruth.txt mono.txt --scale";
+  yfslam eval groundtruth.txt mono.txt --align sim3";
 
 /// Compare an estimated trajectory with the truth: absolute (ATE) and relative (RPE) error.
 ///
@@ -35,9 +34,6 @@ pub struct EvalArgs {
     /// Another estimate, and how much better the first one is.
     #[arg(long, value_name = "OTHER")]
     versus: Option<PathBuf>,
-    /// Let the alignment choose the scale too (Sim(3)), as monocular estimates need.
-    #[arg(long)]
-    scale: bool,
     #[command(flatten)]
     matching: MatchArgs,
     /// Span of the relative error: frames (1f), seconds (1s) or metres (0.5m); may be given several times [default: 1f 1s].
@@ -127,8 +123,7 @@ pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
 
 /// What to measure.
 fn options(args: &EvalArgs, max_diff_ns: u64) -> EvalOptions {
-    let alignment = if args.scale { AlignmentKind::Sim3 } else { AlignmentKind::Se3 };
-    let mut options = EvalOptions { max_diff_ns, alignment, ..Default::default() };
+    let mut options = EvalOptions { max_diff_ns, alignment: args.matching.alignment(true), ..Default::default() };
     if !args.delta.is_empty() {
         options.rpe = args.delta.iter().map(|span| span.options()).collect();
     }

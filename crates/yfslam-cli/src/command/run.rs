@@ -35,6 +35,7 @@ Examples:
   yfslam run DIR --save-map lab.map                    then, another day:
   yfslam run OTHER --load-map lab.map --localise
   yfslam run DIR --masks DIR/masks                     what can move, from a segmentation of your own
+  yfslam run DIR --sensor mono                         one picture a frame, no depth
   yfslam run DIR --detect-every 3                      the network looks at every third frame
   yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
 
@@ -48,6 +49,9 @@ In the output folder:
   dense.map       with --dense, what `yfslam map` makes clouds, octrees, grids and meshes of
   overlay/        with --overlay, one picture a frame
   report.html     with --report, all of it on one page: figures, pictures, tables
+
+A single camera (--sensor mono) knows no lengths: the median depth of its first landmarks is 1, errors are those after alignment by Sim(3).
+It begins its map when it has moved aside, closes no loops, and when lost waits until it recognises a place.
 
 Of several methods each has a folder of its own in the output folder, OUT/none and so on, and report.html compares them. Each frame is
 read or rendered once, and the network looks at it once; results are those of a run of each method alone. A method that fails leaves a
@@ -125,7 +129,9 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
 
     let detection = shared.map_or_else(DetectionTally::default, SharedDetector::into_tally);
     let (reading, truth) = (&reading, truth.as_ref());
-    let judge_by = Judge { source: &source, truth, max_diff_ns, boxes: &boxes, reading, detection: &detection };
+    let alignment = args.matching.alignment(config.depth.source != DepthSource::Motion);
+    let judge_by =
+        Judge { source: &source, truth, max_diff_ns, alignment, boxes: &boxes, reading, detection: &detection };
     let judged = finish(args, lanes, judge_by, terminal)?;
     let run =
         |judged| Run { sequence: &args.source.sequence, source: &source, faults: &args.source.faults, truth, judged };

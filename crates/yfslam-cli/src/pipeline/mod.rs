@@ -10,6 +10,7 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
+use yfslam::config::DepthSource;
 use yfslam::geometry::Pose;
 use yfslam::tracking::TrackingState;
 use yfslam::{Config, RgbdFrame, Slam, Tracked};
@@ -235,6 +236,14 @@ impl Pipeline {
             bail!("no trajectory: none of the {skipped} frames can be used; the first: {first}");
         }
         let (features, with_depth) = self.best_start;
+        if config.depth.source == DepthSource::Motion {
+            bail!(
+                "no trajectory: no map could be begun in {read} frames ({skipped} skipped); the best had {features} features. Without depth \
+                 it takes two frames with {} matches between which the camera has moved aside, not only turned; move it sideways, or \
+                 lower the keys start_* of section monocular in --config",
+                config.monocular.start_min_matches
+            );
+        }
         bail!(
             "no trajectory: no map could be begun in {read} frames ({skipped} skipped); the best had {features} features, \
              {with_depth} of them static and with depth, but tracking.init_min_features asks for {} and \

@@ -12,7 +12,7 @@ use super::over_time::over_time;
 use super::scene::{Captioned, Scene};
 use super::views::views;
 use super::{MethodReport, Picture, Report, tables};
-use crate::improvement_percent;
+use crate::{AlignmentKind, improvement_percent};
 
 /// The style sheet of all pages.
 const STYLE: &str = include_str!("style.css");
@@ -117,6 +117,20 @@ fn percent(value: f64) -> String {
     if value >= 100.0 { "100 %".into() } else { format!("{value:.1} %") }
 }
 
+/// The scale of each method, where alignment was free to choose it.
+fn scales(report: &Report) -> String {
+    let chosen = report.methods.iter().filter_map(|m| Some((m.name, m.evaluation?.ate.alignment)));
+    let chosen: Vec<String> = chosen
+        .filter(|(_, alignment)| alignment.kind == AlignmentKind::Sim3)
+        .map(|(name, alignment)| format!("{name} by s = {:.4}", alignment.scale))
+        .collect();
+    if chosen.is_empty() {
+        String::new()
+    } else {
+        format!(" and scale (Sim(3): {}, for its RPE, too)", chosen.join(", "))
+    }
+}
+
 fn accuracy(report: &Report, scene: &Scene) -> Markup {
     if report.truth.is_none() {
         return html! {
@@ -135,8 +149,8 @@ fn accuracy(report: &Report, scene: &Scene) -> Markup {
                 p.none { "The trajectory of " (method.name) " cannot be compared with the ground truth: too short, or too straight to be aligned." }
             }
             p.about {
-                "Absolute trajectory error (ATE) after alignment by rotation and translation; relative pose error (RPE) without. S.D.: \
-                 standard deviation."
+                "Absolute trajectory error (ATE) after alignment by rotation and translation" (scales(report))
+                "; relative pose error (RPE) without. S.D.: standard deviation."
                 @if report.methods.len() > 1 { " Improvement is (1 − error / error of the first) · 100 %." }
             }
             div.pair.accuracy[beside].wide[!beside] {

@@ -15,7 +15,7 @@ use crate::loops::{LoopClosed, LoopCloser, Recogniser, WholeAdjustment};
 use crate::map::{KeyFrameId, Map};
 use crate::mapping::Mapper;
 use crate::sensor::SensorModel;
-use crate::tracking::{Sightings, TrackedFrame};
+use crate::tracking::{Sightings, TrackedFrame, TwoViewStart};
 pub use thread::BackendThread;
 
 /// Where mapping and loop closing run.
@@ -80,6 +80,14 @@ impl Backend {
             loop_closed = self.loops.close(&self.sensor, &self.config, &self.recogniser, &mut self.map, keyframe);
         }
         Inserted { keyframe, loop_closed, mapping, places: started.elapsed() - mapping }
+    }
+
+    /// Begins the map of a camera without depth.
+    fn begin(&mut self, start: &TwoViewStart) -> Inserted {
+        let started = Instant::now();
+        let keyframe = self.mapper.begin(&self.sensor, &mut self.map, start);
+        self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).learn(&self.map, keyframe);
+        Inserted { keyframe, loop_closed: None, mapping: started.elapsed(), places: Duration::ZERO }
     }
 
     /// Adjusts the whole submap of a keyframe.
@@ -164,6 +172,17 @@ impl MapOwner {
             Self::Threaded(thread) => {
                 thread.insert(frame, color);
                 if is_first { thread.wait() } else { None }
+            }
+        }
+    }
+
+    /// Begins the map of a camera without depth, and waits for it. Returns what became of the second keyframe.
+    pub fn begin(&mut self, start: TwoViewStart) -> Option<Inserted> {
+        match self {
+            Self::Inline(backend) => Some(backend.begin(&start)),
+            Self::Threaded(thread) => {
+                thread.begin(start);
+                thread.wait()
             }
         }
     }

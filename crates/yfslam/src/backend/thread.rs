@@ -17,7 +17,7 @@ use super::{Backend, Inserted};
 use crate::image::RgbImage;
 use crate::loops::{Recogniser, WholeAdjustment};
 use crate::map::{KeyFrameId, Map};
-use crate::tracking::{Sightings, TrackedFrame};
+use crate::tracking::{Sightings, TrackedFrame, TwoViewStart};
 
 /// Requests that wait: a keyframe, an adjusted copy, and a few counts of sightings.
 const QUEUE: usize = 4;
@@ -28,6 +28,7 @@ const NOTE_AT: usize = 4000;
 
 enum Request {
     Insert(Box<TrackedFrame>, Arc<RgbImage>),
+    Begin(Box<TwoViewStart>),
     Note(Sightings),
     /// The adjustment of that number is done, or has ended by a panic.
     Adjusted(u64, Option<Box<WholeAdjustment>>),
@@ -84,6 +85,11 @@ impl BackendThread {
     pub(super) fn insert(&mut self, frame: &TrackedFrame, color: &Arc<RgbImage>) {
         self.busy = true;
         self.send(Request::Insert(Box::new(frame.clone()), Arc::clone(color)));
+    }
+
+    pub(super) fn begin(&mut self, start: TwoViewStart) {
+        self.busy = true;
+        self.send(Request::Begin(Box::new(start)));
     }
 
     fn send(&mut self, request: Request) {
@@ -214,6 +220,7 @@ impl Worker {
                     }
                     Some(inserted)
                 }
+                Request::Begin(start) => Some(self.backend.begin(&start)),
                 Request::Adjusted(number, adjusted) => {
                     if !self.adjuster.is_wanted(number) {
                         continue;

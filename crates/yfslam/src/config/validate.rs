@@ -23,7 +23,7 @@ impl Config {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let share = |x: f64| (0.0..=1.0).contains(&x);
         let (f, d, s, t) = (&self.features, &self.depth, &self.stereo, &self.tracking);
-        let checks: [(&'static str, String, bool, &'static str); 23] = [
+        let checks: [(&'static str, String, bool, &'static str); 25] = [
             ("features.count", f.count.to_string(), f.count > 0, "at least 1"),
             ("features.levels", f.levels.to_string(), (1..=16).contains(&f.levels), "from 1 to 16"),
             (
@@ -116,6 +116,18 @@ impl Config {
                 "a positive length in px",
             ),
             ("tracking.max_gap_s", t.max_gap_s.to_string(), positive(t.max_gap_s), "a positive time in s"),
+            (
+                "monocular.start_features",
+                self.monocular.start_features.to_string(),
+                self.monocular.start_features.is_finite() && self.monocular.start_features >= 1.0,
+                "at least 1",
+            ),
+            (
+                "monocular.start_radius_px",
+                self.monocular.start_radius_px.to_string(),
+                positive(self.monocular.start_radius_px.into()),
+                "a positive length in px",
+            ),
             ("pose.rounds", self.pose.rounds.to_string(), self.pose.rounds > 0, "at least 1"),
         ];
         match checks.into_iter().find(|(.., holds, _)| !holds) {

@@ -72,7 +72,7 @@ pub fn eight_point(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<
 }
 
 /// Moves the mean of positions to 0 and their mean distance from it to √2.
-fn normalisation(positions: impl Iterator<Item = [f32; 2]> + Clone) -> Option<Matrix3<f64>> {
+pub(super) fn normalisation(positions: impl Iterator<Item = [f32; 2]> + Clone) -> Option<Matrix3<f64>> {
     let count = positions.clone().count() as f64;
     let (sx, sy) = positions.clone().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p[0]), y + f64::from(p[1])));
     let (mx, my) = (sx / count, sy / count);

@@ -1,14 +1,22 @@
 //! Rigid motions and the pinhole model in the form the optimisers need.
 
+mod essential;
 mod fundamental;
+mod homography;
 mod p3p;
 mod pinhole;
 mod se3;
+mod triangulate;
+mod two_view;
 
+pub use essential::motions_of_essential;
 pub use fundamental::{Pair, eight_point, epipolar_distance, fundamental_ransac};
+pub use homography::{homography, motions_of_homography, transfer_distance2};
 pub use p3p::p3p;
 pub use pinhole::Pinhole;
 pub use se3::{perturbed, se3_exp, se3_log, skew};
+pub use triangulate::midpoint;
+pub use two_view::{Model, Refused, TwoView, reconstruct};
 
 /// A rigid motion; `t_a_b` maps points given in frame b into frame a.
 pub type Pose = nalgebra::Isometry3<f64>;

@@ -85,6 +85,19 @@ impl Map {
         }
     }
 
+    /// Whether any keyframe measured depth: else the unit of length is arbitrary.
+    pub fn has_depths(&self) -> bool {
+        self.keyframes.values().any(|k| k.features.features.iter().any(|f| f.depth_m.is_some()))
+    }
+
+    /// Median depth of the landmarks that a keyframe sees; 0 if there are none.
+    pub fn median_depth(&self, keyframe: &KeyFrame) -> f64 {
+        let landmarks = keyframe.sights().filter_map(|(_, id)| self.landmarks.get(id));
+        let mut depths: Vec<f64> = landmarks.map(|l| (keyframe.t_cam_world * l.position).z).collect();
+        let middle = depths.len() / 2;
+        if depths.is_empty() { 0.0 } else { *depths.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    }
+
     /// How well a landmark is observed: 2 for each observation with depth, 1 for each without (ORB-SLAM2).
     pub fn observation_weight(&self, landmark: &Landmark) -> usize {
         landmark

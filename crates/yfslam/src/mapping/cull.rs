@@ -27,7 +27,8 @@ pub fn young_landmarks(
     still_young
 }
 
-/// Removes covisible keyframes of `keyframe` of whose close landmarks nearly all are seen as finely by enough others.
+/// Removes covisible keyframes of `keyframe` of whose close landmarks nearly all are seen as finely by enough others. Without depth none
+/// is known to be close, and all count.
 pub fn redundant_keyframes(sensor: &SensorModel, config: &MappingConfig, map: &mut Map, keyframe: KeyFrameId) {
     let Some(k) = map.keyframe(keyframe) else { return };
     let candidates: Vec<KeyFrameId> = k.covisible.iter().map(|(id, _)| *id).collect();
@@ -44,7 +45,7 @@ fn is_redundant(sensor: &SensorModel, config: &MappingConfig, map: &Map, candida
     for (i, id) in k.sights() {
         let Some(landmark) = map.landmark(id) else { continue };
         let f = &k.features.features[i];
-        if f.depth_m.is_none_or(|z| f64::from(z) > sensor.close_limit_m) {
+        if sensor.measures_depth && f.depth_m.is_none_or(|z| f64::from(z) > sensor.close_limit_m) {
             continue;
         }
         total += 1;

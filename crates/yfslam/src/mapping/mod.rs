@@ -13,7 +13,7 @@ use crate::config::Config;
 use crate::image::RgbImage;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::sensor::SensorModel;
-use crate::tracking::TrackedFrame;
+use crate::tracking::{StartFrame, TrackedFrame, TwoViewStart};
 pub use window::Window;
 
 /// Grows and refines the map.
@@ -46,6 +46,23 @@ impl Mapper {
         }
         cull::redundant_keyframes(sensor, &config.mapping, map, keyframe);
         keyframe
+    }
+
+    /// Begins a map, or a submap, with the two frames of a camera without depth. Returns the second keyframe.
+    pub fn begin(&mut self, sensor: &SensorModel, map: &mut Map, start: &TwoViewStart) -> KeyFrameId {
+        let [first, second] = [&start.first, &start.second].map(|StartFrame { frame, .. }| {
+            map.insert_keyframe(frame.timestamp_ns, frame.t_cam_world, frame.features.clone())
+        });
+        for &(i, j, point) in &start.points {
+            let color = color_at(&start.second.color, start.second.frame.features.features[j].raw);
+            if let Some(id) = map.insert_landmark(point, second, j, color, &sensor.scale_factors) {
+                map.add_observation(id, first, i);
+                map.update_landmark(id, &sensor.scale_factors);
+                self.young.push(id);
+            }
+        }
+        map.update_covisibility(second);
+        second
     }
 
     /// Starts over with an empty list of young landmarks.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::config::Config;
 use crate::features::Feature;
-use crate::geometry::{Pose, skew};
+use crate::geometry::{Pose, midpoint, skew};
 use crate::image::RgbImage;
 use crate::map::{KeyFrame, KeyFrameId, LandmarkId, Map};
 use crate::mapping::color_at;
@@ -30,7 +30,12 @@ pub fn new_landmarks(
     for neighbour in neighbours {
         let (Some(a), Some(b)) = (map.keyframe(keyframe), map.keyframe(neighbour)) else { continue };
         let t_b_a = b.t_cam_world * a.t_cam_world.inverse();
-        if t_b_a.translation.vector.norm() < sensor.pinhole.bf / sensor.pinhole.fx {
+        let min_baseline = if sensor.measures_depth {
+            sensor.baseline()
+        } else {
+            config.monocular.min_baseline_share * map.median_depth(b)
+        };
+        if t_b_a.translation.vector.norm() < min_baseline {
             continue;
         }
         for (i, j) in match_along_epipolar_lines(sensor, config, a, b, &t_b_a) {
@@ -125,36 +130,4 @@ fn triangulate(
     let ratio_scale = f64::from(sensor.scale(f.octave)) / f64::from(sensor.scale(g.octave));
     let tolerance = 1.5 * f64::from(sensor.scale(1));
     (ratio_distance < ratio_scale * tolerance && ratio_distance * tolerance > ratio_scale).then_some(point)
-}
-
-/// The point midway between two rays where they are nearest to each other.
-fn midpoint(
-    center_a: &Vector3<f64>,
-    ray_a: &Vector3<f64>,
-    center_b: &Vector3<f64>,
-    ray_b: &Vector3<f64>,
-) -> Option<Point3<f64>> {
-    let (aa, bb, ab) = (ray_a.norm_squared(), ray_b.norm_squared(), ray_a.dot(ray_b));
-    let determinant = aa * bb - ab * ab;
-    if determinant < 1e-12 * aa * bb {
-        return None;
-    }
-    let d = center_b - center_a;
-    let s = (d.dot(ray_a) * bb - d.dot(ray_b) * ab) / determinant;
-    let t = (d.dot(ray_a) * ab - d.dot(ray_b) * aa) / determinant;
-    (s > 0.0 && t > 0.0).then(|| Point3::from((center_a + ray_a * s + center_b + ray_b * t) * 0.5))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn midpoint_of_crossing_rays_is_the_crossing() {
-        let p = Vector3::new(0.3, -0.2, 2.0);
-        let (a, b) = (Vector3::zeros(), Vector3::new(0.5, 0.1, 0.0));
-        let found = midpoint(&a, &((p - a) * 0.7), &b, &((p - b) * 0.4));
-        assert!(found.is_some_and(|q| (q.coords - p).norm() < 1e-12));
-        assert!(midpoint(&a, &p, &b, &p).is_none(), "parallel rays meet nowhere");
-    }
 }

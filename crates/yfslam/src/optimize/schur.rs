@@ -108,6 +108,25 @@ impl BundleProblem {
         summary
     }
 
+    /// Standard deviation of the first camera's place as seen from the second, as a share of the distance between them: how well two views
+    /// tell the direction of their motion, going by the noise of what they see. Their scale, which they leave open, is taken as known.
+    /// Infinite for anything but two poses of which one is free.
+    pub fn two_view_sigma(&self) -> f64 {
+        let ([pose, fixed], 1) = (self.poses.as_slice(), self.free_poses) else { return f64::INFINITY };
+        let mut system = NormalEquations::new(self);
+        system.linearise(self, false);
+        system.reduce(self, 0.0);
+        let mut information: Matrix6<f64> = system.reduced.fixed_view::<6, 6>(0, 0).into();
+        // A left perturbation moves the camera by its translation part.
+        let baseline = (pose * fixed.inverse()).translation.vector;
+        let along = baseline.normalize();
+        let mut block = information.fixed_view_mut::<3, 3>(0, 0);
+        let certain = 1e3 * block.norm();
+        block += along * along.transpose() * certain;
+        let covariance = information.try_inverse().map(|inverse| inverse.fixed_view::<3, 3>(0, 0).trace());
+        covariance.filter(|v| *v >= 0.0).map_or(f64::INFINITY, |variance| variance.sqrt() / baseline.norm())
+    }
+
     /// The point of observation `o` in its camera's frame.
     fn point_in_camera(&self, o: &Observation) -> Vector3<f64> {
         (self.poses[o.pose] * self.points[o.point]).coords
@@ -245,8 +264,8 @@ impl NormalEquations {
         Some(factor.solve(&self.reduced_rhs).column(0).into_owned())
     }
 
-    /// Solves the damped system; `None` if it is not positive definite.
-    fn step(&mut self, problem: &BundleProblem, lambda: f64) -> Option<(Vec<Pose>, Vec<Point3<f64>>)> {
+    /// Eliminates the points from the damped system. Returns the inverses of their blocks.
+    fn reduce(&mut self, problem: &BundleProblem, lambda: f64) -> Vec<Matrix3<f64>> {
         let n = problem.free_poses;
         self.reduced.fill(0.0);
         for (k, (h, b)) in self.pose_blocks.iter().zip(&self.pose_rhs).enumerate() {
@@ -288,6 +307,13 @@ impl NormalEquations {
                 }
             }
         }
+        inverses
+    }
+
+    /// Solves the damped system; `None` if it is not positive definite.
+    fn step(&mut self, problem: &BundleProblem, lambda: f64) -> Option<(Vec<Pose>, Vec<Point3<f64>>)> {
+        let n = problem.free_poses;
+        let inverses = self.reduce(problem, lambda);
         let solution = self.solve_reduced()?;
         let mut poses = problem.poses.clone();
         for (k, pose) in poses.iter_mut().take(n).enumerate() {

@@ -41,6 +41,11 @@ pub enum SetupError {
         "the map was made with another camera ({0} px wide, fx {1}): use its calibration, or localise in the map instead of extending it"
     )]
     MapCamera(usize, f64),
+    /// A map whose unit of length is not the metre, for a camera that measures metres.
+    #[error(
+        "the map was made by a camera without depth, in a unit of its own: use it with such a camera (--sensor mono, depth.source = \"motion\")"
+    )]
+    MapWithoutScale,
     /// A thread could not be started.
     #[error("a thread could not be started: {0}")]
     Thread(#[from] std::io::Error),

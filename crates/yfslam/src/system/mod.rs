@@ -1,5 +1,6 @@
 //! The whole path from a frame to its pose, on one page.
 
+mod begin;
 mod errors;
 mod results;
 mod times;
@@ -23,7 +24,7 @@ use crate::map::persist::SavedMap;
 use crate::map::{KeyFrameId, Map};
 use crate::right_eye::{METRES_PER_UNIT, RightEye};
 use crate::sensor::SensorModel;
-use crate::tracking::{TrackedFrame, Tracker, TrackingState};
+use crate::tracking::{Initialiser, TrackedFrame, Tracker, TrackingState};
 pub use errors::{FrameRejected, SetupError};
 pub use times::StageTimes;
 use times::Stopwatch;
@@ -77,6 +78,7 @@ pub struct Slam {
     own_depth: Arc<DepthImage>,
     extracted: Features,
     tracker: Tracker,
+    initialiser: Initialiser,
     owner: MapOwner,
     execution: Execution,
     state: TrackingState,
@@ -117,7 +119,7 @@ impl Slam {
             DepthSource::Stereo => Some(RightEye::open(&config, &sensor)?),
             DepthSource::Image | DepthSource::Motion => None,
         };
-        let config = Arc::new(config);
+        let config = Arc::new(config.for_sensor());
         let backend = Backend::new(sensor.clone(), config.clone(), Map::default());
         // A method that asks for no boxes needs no detector.
         let detector = detector.filter(|_| config.dynamic.method.needs_boxes());
@@ -159,6 +161,7 @@ impl Slam {
             }),
             extracted: Features::default(),
             tracker: Tracker::default(),
+            initialiser: Initialiser::default(),
             state: TrackingState::NotInitialized,
             anchors: Vec::new(),
         })
@@ -191,6 +194,9 @@ impl Slam {
         }
         if map_use == MapUse::Extend && saved.camera != self.sensor.camera {
             return Err(SetupError::MapCamera(saved.camera.width, saved.camera.fx));
+        }
+        if self.sensor.measures_depth && saved.map.keyframe_count() > 0 && !saved.map.has_depths() {
+            return Err(SetupError::MapWithoutScale);
         }
         self.first_keyframe = saved.map.keyframes_ever();
         let backend = Backend::new(self.sensor.clone(), self.config.clone(), saved.map);
@@ -231,8 +237,10 @@ impl Slam {
             loop_closed = times.note(&inserted);
         }
         let tracked = match self.state {
-            // Without depth one frame makes no map.
-            TrackingState::NotInitialized if self.config.depth.source == DepthSource::Motion => false,
+            TrackingState::NotInitialized if !self.sensor.measures_depth => {
+                let begun = self.begin_from_two_views(frame);
+                begun.is_some_and(|begun| times.note(&begun).is_none())
+            }
             TrackingState::NotInitialized => self.owner.is_free() && self.has_enough_to_start(),
             TrackingState::Tracking => {
                 let min_inliers = self.config.tracking.local_min_inliers;
@@ -264,8 +272,9 @@ impl Slam {
             self.tracker.reject();
         }
         times.tracking = clock.lap();
-        let is_keyframe = tracked && self.wants_keyframe();
-        if is_keyframe {
+        let made_map = tracked && self.state == TrackingState::NotInitialized && !self.sensor.measures_depth;
+        let is_keyframe = made_map || tracked && self.wants_keyframe();
+        if is_keyframe && !made_map {
             self.tracker.offered_keyframe();
             let is_first = self.state == TrackingState::NotInitialized;
             if let Some(inserted) = self.owner.insert(&self.tracker.current, &frame.color, is_first) {
@@ -384,16 +393,9 @@ impl Slam {
         let last = &self.tracker.current.features.features;
         let trusted = last.iter().filter(|f| f.trust > 0.0).count().max(1);
         let factor = (last.len() as f64 / trusted as f64).clamp(1.0, self.config.dynamic.max_extra_features);
-        (count * factor) as usize
-    }
-
-    /// Whether the frame has the features, and the depths, that a map needs.
-    fn has_enough_to_start(&self) -> bool {
-        let features = &self.tracker.current.features.features;
-        let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
-        let by_motion = self.config.depth.source == DepthSource::Motion;
-        features.len() >= self.config.tracking.init_min_features
-            && (by_motion || with_depth >= self.config.tracking.init_min_landmarks)
+        let young = self.owner.map().keyframe_count() <= self.config.tracking.reset_max_keyframes;
+        let begins = young && !self.sensor.measures_depth;
+        (count * factor * if begins { self.config.monocular.start_features } else { 1.0 }) as usize
     }
 
     /// Seeks the frame of a camera that was lost in the whole map.
@@ -425,42 +427,6 @@ impl Slam {
         let free = self.owner.is_free();
         self.passed_over += usize::from(!free);
         free
-    }
-
-    /// Whether the camera has seen enough for a map for a while, and nothing in it was recognised. Time in which there was nothing to
-    /// see does not count.
-    fn is_elsewhere(&mut self) -> bool {
-        if self.map_use == Some(MapUse::Localise) {
-            return false;
-        }
-        self.unknown_frames += usize::from(self.has_enough_to_start());
-        self.unknown_frames as f64 > self.config.tracking.reset_after_s * self.sensor.camera.fps
-    }
-
-    /// Begins a submap with the next frame, in a world that continues where the camera was lost. The old one stays, to be recognised
-    /// and joined, unless it is so young that a fresh start is worth more (ORB-SLAM2): then the poses that hung on it go with it.
-    fn begin_submap(&mut self) -> TrackingState {
-        self.unknown_frames = 0;
-        let map = self.owner.map();
-        // What an earlier session left is kept in any case.
-        let is_own = |root: &KeyFrameId| map.keyframe(*root).is_some_and(|k| k.sequence >= self.first_keyframe);
-        let root = self.tracker.reference().and_then(|reference| map.root(reference)).filter(is_own);
-        let young = self.config.tracking.reset_max_keyframes;
-        let keyframes = root.map_or(0, |root| map.submap_size(root, young + 1));
-        if map.keyframe_count() <= young && self.map_use.is_none() {
-            tracing::warn!(keyframes, "lost soon after the start: the map is begun anew");
-            self.owner.reset();
-            self.anchors.clear();
-            self.resets += 1;
-        } else {
-            tracing::warn!(keyframes, "nothing was recognised: a new submap is begun");
-            if let Some(root) = root.filter(|_| keyframes <= young) {
-                self.owner.forget(root);
-            }
-        }
-        self.filter.forget_views();
-        self.tracker.reset();
-        TrackingState::NotInitialized
     }
 
     fn note_anchor(&mut self, timestamp_ns: i64) {

@@ -28,7 +28,7 @@ pub fn is_keyframe_wanted(
 ) -> bool {
     let known = map.submap_size(reference, 3);
     let few = known <= 2;
-    let min_weight = if few { config.min_observation_weight - 1 } else { config.min_observation_weight };
+    let min_weight = if few { config.min_observation_weight.saturating_sub(1) } else { config.min_observation_weight };
     let reference_landmarks = map.keyframe(reference).map_or(0, |k| {
         k.sights().filter_map(|(_, l)| map.landmark(l)).filter(|l| map.observation_weight(l) >= min_weight).count()
     });

@@ -4,6 +4,7 @@
 //! The tracker only reads the map; what it saw of it is noted in [`Sightings`].
 
 mod frame;
+mod initialise;
 pub mod keyframe_policy;
 mod local_map;
 pub mod search;
@@ -14,6 +15,7 @@ use crate::geometry::Pose;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::sensor::SensorModel;
 pub use frame::{Sight, TrackedFrame};
+pub use initialise::{Initialiser, StartFrame, TwoViewStart};
 use keyframe_policy::{FrameSummary, is_keyframe_wanted};
 use local_map::LocalMap;
 use search::{search_keyframe, search_last_frame, search_local_map};

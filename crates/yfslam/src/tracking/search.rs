@@ -6,7 +6,7 @@
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use crate::config::TrackingConfig;
+use crate::config::{Config, TrackingConfig};
 use crate::features::Descriptor;
 use crate::features::matching::{RotationHistogram, two_nearest};
 use crate::map::{KeyFrame, LandmarkId, Map};
@@ -135,7 +135,7 @@ fn match_last_frame<S: Simd>(
 ) {
     let projector = Projector::new(sensor, &current.t_cam_world);
     let center_in_last = last.t_cam_world * projector.center_world;
-    let baseline = sensor.pinhole.bf / sensor.pinhole.fx;
+    let baseline = sensor.baseline();
     let top = (sensor.levels() - 1) as u8;
     for (i, sight) in last.sights.iter().enumerate() {
         let Some(sight) = sight else { continue };
@@ -189,6 +189,64 @@ pub fn search_keyframe(
     }
     rotation.for_each_outlier(|j| current.sights[j as usize] = None);
     current.matched()
+}
+
+/// Matches features of the finest level between the first frame and the current one, each around where it was seen last, which is
+/// brought up to date. Returns pairs of feature indices (in first, in current).
+pub fn search_first_frame(
+    config: &Config,
+    first: &TrackedFrame,
+    current: &TrackedFrame,
+    last_seen: &mut [[f32; 2]],
+    rotation: &mut RotationHistogram,
+) -> Vec<(usize, usize)> {
+    rotation.clear();
+    // For each feature of the current frame the feature of the first that it is nearest to, and the distance.
+    let mut owner: Vec<Option<(u32, usize)>> = vec![None; current.features.len()];
+    dispatch!(Level::new(), simd => match_first_frame(simd, config, first, current, last_seen, &mut owner));
+    for (j, (_, i)) in owner.iter().enumerate().filter_map(|(j, owner)| Some((j, (*owner)?))) {
+        let turn = first.features.features[i].angle_rad - current.features.features[j].angle_rad;
+        rotation.add(turn, j as u32);
+    }
+    rotation.for_each_outlier(|j| owner[j as usize] = None);
+    let mut matches: Vec<(usize, usize)> =
+        owner.iter().enumerate().filter_map(|(j, owner)| owner.map(|(_, i)| (i, j))).collect();
+    matches.sort_unstable();
+    for &(i, j) in &matches {
+        let f = &current.features.features[j];
+        last_seen[i] = [f.u, f.v];
+    }
+    matches
+}
+
+#[inline(always)]
+fn match_first_frame<S: Simd>(
+    _: S,
+    config: &Config,
+    first: &TrackedFrame,
+    current: &TrackedFrame,
+    last_seen: &[[f32; 2]],
+    owner: &mut [Option<(u32, usize)>],
+) {
+    let c = &config.monocular;
+    for (i, f) in first.features.features.iter().enumerate() {
+        // The finest level: coarser corners are known too badly to begin with.
+        if f.octave > 0 || f.trust <= 0.0 {
+            continue;
+        }
+        let [u, v] = last_seen[i];
+        let mut best = Best::none();
+        current.features.for_each_near(u, v, c.start_radius_px, 0..=0, |j| {
+            if current.features.features[j].trust > 0.0 {
+                best.offer(j, first.features.descriptors[i].distance(&current.features.descriptors[j]), 0);
+            }
+        });
+        if best.is_distinct(config.tracking.hamming_low, c.start_ratio)
+            && owner[best.index].is_none_or(|(distance, _)| best.distance < distance)
+        {
+            owner[best.index] = Some((best.distance, i));
+        }
+    }
 }
 
 /// Matches landmarks of the local map that the frame does not see yet. `visible` is refilled with those that lie in view.

@@ -1,0 +1,93 @@
+//! A single camera: its depth comes from its motion alone, and its unit of length is its own.
+#![allow(clippy::unwrap_used, reason = "a test may")]
+
+mod common;
+
+use std::fs;
+use std::sync::Arc;
+
+use common::{ate_rmse, fails, report, succeeds};
+use nalgebra::{Rotation3, Vector3};
+use yfslam::config::DepthSource;
+use yfslam::dynamic::Method;
+use yfslam::image::RgbImage;
+use yfslam::{Camera, Config, RgbdFrame, Slam};
+use yfslam_synth::World;
+
+/// A desk, seen while the camera moves along its axes, and the same walk through people.
+const DESK: &str = "synth:sitting_xyz?people=0&width=320&height=240&frames=90";
+const WALK: &str = "synth:walking_xyz?people=2&share=0.2&width=320&height=240&frames=90";
+
+#[test]
+fn a_single_camera_maps_a_desk_up_to_scale_and_finds_back_into_its_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = ["run", DESK, "--sensor", "mono"];
+    let output = succeeds(folder.path(), &[&run[..], &["--save-map", "desk.map", "--out", "a"]].concat());
+    assert!(
+        output.stdout.contains("ATE, Sim(3) (m)") && output.stdout.contains("; Sim(3), scale s = "),
+        "{}",
+        output.stdout
+    );
+    let mapped = report(&folder.path().join("a"));
+    let (before, tracked) =
+        (mapped["frames"]["before_map"].as_u64().unwrap(), mapped["frames"]["tracked"].as_u64().unwrap());
+    assert!(before < 50 && before + tracked == 90, "{}", mapped["frames"]);
+    // A way of 0.7 m, most of it aside.
+    assert!(ate_rmse(&mapped) < 0.015, "{}", ate_rmse(&mapped));
+    let again = [&run[..], &["--load-map", "desk.map", "--localise", "--start", "50", "--out", "b"]].concat();
+    succeeds(folder.path(), &again);
+    let localised = report(&folder.path().join("b"));
+    assert!(localised["frames"]["tracked"].as_u64().unwrap() >= 38, "{}", localised["frames"]);
+    let with_depth = ["run", DESK, "--load-map", "desk.map", "--localise", "-q"];
+    fails(folder.path(), &with_depth, &["without depth", "--sensor mono"]);
+}
+
+#[test]
+fn a_single_camera_tracks_among_people_with_their_boxes_and_to_the_same_bits_again() {
+    let folder = tempfile::tempdir().unwrap();
+    for out in ["a", "b"] {
+        succeeds(folder.path(), &["run", WALK, "--sensor", "mono", "--method", "boxes", "--out", out, "-q"]);
+    }
+    let report = report(&folder.path().join("a"));
+    assert!(report["frames"]["before_map"].as_u64().unwrap() < 60, "{}", report["frames"]);
+    assert_eq!(report["frames"]["lost"], 0);
+    assert!(ate_rmse(&report) < 0.03, "{}", ate_rmse(&report));
+    let [a, b] = ["a", "b"].map(|out| fs::read(folder.path().join(out).join("trajectory.txt")).unwrap());
+    assert!(a == b);
+}
+
+/// What a camera sees of a far picture that it turns away from by `turn` (axis times angle, radians).
+fn turned(picture: &RgbImage, camera: &Camera, turn: Vector3<f64>) -> RgbImage {
+    let (width, height) = (picture.width(), picture.height());
+    let rotation = Rotation3::new(turn);
+    let pixel = |index: usize| {
+        let (u, v) = ((index % width) as f64, (index / width) as f64);
+        let ray = rotation * Vector3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
+        let (x, y) = (camera.fx * ray.x / ray.z + camera.cx, camera.fy * ray.y / ray.z + camera.cy);
+        let (column, row) = (x.floor().max(0.0) as usize, y.floor().max(0.0) as usize);
+        let (dx, dy) = (x - x.floor(), y - y.floor());
+        let at = |c: usize, r: usize| picture.get(c, r).copied().unwrap_or_default().map(f64::from);
+        let corners = [at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)];
+        let shares = [(1.0 - dx) * (1.0 - dy), dx * (1.0 - dy), (1.0 - dx) * dy, dx * dy];
+        [0, 1, 2].map(|k| corners.iter().zip(shares).map(|(c, share)| c[k] * share).sum::<f64>().round() as u8)
+    };
+    RgbImage::from_vec(width, height, (0..width * height).map(pixel).collect()).unwrap()
+}
+
+#[test]
+fn a_single_camera_that_only_turns_begins_no_map() {
+    let world = World::new(&yfslam_synth::parse("sitting_xyz?people=0&frames=1").unwrap()).unwrap();
+    let RgbdFrame { color, depth, .. } = world.frame(0).frame;
+    let camera = &world.config().camera;
+    let mut config = Config::default();
+    (config.depth.source, config.dynamic.method) = (DepthSource::Motion, Method::None);
+    let mut slam = Slam::new(config, camera, None).unwrap();
+    for k in 0..24 {
+        let turn = Vector3::new(0.002, 0.006, 0.003) * f64::from(k);
+        let color = Arc::new(turned(&color, camera, turn));
+        let (depth, timestamp_ns) = (Arc::clone(&depth), i64::from(k) * 33_000_000);
+        let frame = RgbdFrame { timestamp_ns, color, depth, right: None, detections: None, mask: None };
+        assert!(slam.track(&frame).unwrap().t_world_cam.is_none(), "frame {k}");
+    }
+    assert_eq!(slam.map().keyframe_count(), 0);
+}
