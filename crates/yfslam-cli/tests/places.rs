@@ -27,6 +27,17 @@ fn a_camera_that_was_blinded_is_found_again_within_ten_frames() {
     assert!(ate_rmse(&report) < 0.015, "{}", ate_rmse(&report));
 }
 
+#[test]
+fn a_camera_lost_at_a_corner_does_not_take_the_next_corridor_for_the_last() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = "synth:corridor_loop?frames=1330&width=320&height=240";
+    succeeds(folder.path(), &["run", world, "--end", "275", "--out", "out", "-q"]);
+    let report = report(&folder.path().join("out"));
+    // Somebody hides the corner; after it doors and lamps are as they were before, 6 m and a right angle away.
+    assert_eq!(report["places"]["lost"][0]["from_ns"], 5_833_333_333_u64, "{}", report["places"]["lost"]);
+    assert!(ate_rmse(&report) < 0.1, "{}", ate_rmse(&report));
+}
+
 /// Once around a block of corridors and a little on, at ten frames a second.
 const AROUND: &str = "synth:corridor_loop?people=0&frames=440&fps=10&width=320&height=240";
 

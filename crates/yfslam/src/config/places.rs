@@ -29,8 +29,8 @@ config_section! {
         relocalise_min_inliers: usize = 50,
         /// Standard deviation of the camera's position up to which a place is believed, m: a few far landmarks fit many poses.
         max_position_sigma_m: f64 = 0.05,
-        /// Of the landmarks that tracking would find from there, the share that must fit and look the same, if the camera can have come
-        /// there since it was lost.
+        /// Of the landmarks that tracking would find from there, the share that must fit and look the same, if the camera was lost
+        /// just now and can have come there since; the limit rises to `relocalise_min_likeness_beyond` within `max_reach_s`.
         relocalise_min_likeness: f64 = 0.15,
         /// The same for any other place. In corridors whose doors and lamps repeat, places that the map does not have were taken for
         /// others with up to 0.34; right ones had 0.36 to 1.2.

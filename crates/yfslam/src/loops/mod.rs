@@ -56,6 +56,8 @@ pub struct Reach {
     pub center_world: Point3<f64>,
     /// How far it can have come since, m.
     pub radius_m: f64,
+    /// Likeness that a place within reach must have.
+    pub min_likeness: f64,
 }
 
 impl Reach {
@@ -66,7 +68,7 @@ impl Reach {
 }
 
 /// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then. Of several places that it may show
-/// the likeliest is taken; one beyond `reach` has to be likelier still.
+/// the likeliest is taken; one beyond `reach` has to be likelier.
 pub fn relocalise(
     recogniser: &mut Recogniser,
     sensor: &SensorModel,
@@ -83,7 +85,8 @@ pub fn relocalise(
         let Some(evidence) = verify::locate(sensor, config, map, place, frame, &needed) else { continue };
         let within = reach.is_some_and(|reach| reach.includes(map, place.keyframe, &frame.t_cam_world));
         tracing::debug!(?evidence, within, "a place to be found at");
-        if !within && evidence.likeness < c.relocalise_min_likeness_beyond {
+        let limit = reach.filter(|_| within).map_or(c.relocalise_min_likeness_beyond, |reach| reach.min_likeness);
+        if evidence.likeness < limit {
             continue;
         }
         if best.as_ref().is_none_or(|(likeness, ..)| evidence.likeness > *likeness) {

@@ -414,8 +414,16 @@ impl Slam {
         let lost_s = self.tracker.current.timestamp_ns.saturating_sub(last.timestamp_ns) as f64 * 1e-9;
         let t_cam_world = last.t_cam_reference * self.owner.map().keyframe_pose(last.reference)?;
         let center_world = t_cam_world.inverse_transform_point(&Point3::origin());
-        let reach = Reach { reference: last.reference, center_world, radius_m: c.max_speed_m_per_s * (lost_s + 1.0) };
-        (lost_s <= c.max_reach_s).then_some(reach)
+        // The longer it is lost, the less its last place says, until it says nothing.
+        let forgotten = lost_s / c.max_reach_s;
+        let gain = c.relocalise_min_likeness_beyond - c.relocalise_min_likeness;
+        let reach = Reach {
+            reference: last.reference,
+            center_world,
+            radius_m: c.max_speed_m_per_s * (lost_s + 1.0),
+            min_likeness: c.relocalise_min_likeness + gain * forgotten,
+        };
+        (forgotten <= 1.0).then_some(reach)
     }
 
     /// Whether the frame is to become a keyframe, and can.
