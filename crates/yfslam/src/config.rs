@@ -248,8 +248,8 @@ config_section! {
         grouping: Grouping = Grouping::Exact,
         /// Names of the classes that can move.
         movable: Vec<String> = vec!["person".to_owned()],
-        /// Frames from one look of the detector to the next; 1 has it look at each. Frames between count as frames without boxes, over
-        /// which tracks are carried; boxes that come with the frames are thinned alike.
+        /// Frames from one look of the detector to the next; 1 has it look at each. Over those between tracks are carried: by method
+        /// `full` for as long as their bodies are there, by `yf` as over frames without boxes. Boxes that come with the frames are thinned alike.
         detect_every: usize = 1,
         /// Whether boxes are used when they are ready, perhaps some frames late, so that no frame waits for the detector once there is a
         /// map: for boards on which it is slower than the camera. Results then differ from run to run.

@@ -123,6 +123,15 @@ impl Film {
         Ok(Slam::new(config.clone(), &self.camera, None)?)
     }
 
+    /// A system that has seen the first `share` of the film, and the number of frames that is.
+    pub fn mapped(&self, config: &Config, share: f64) -> Result<(Slam, usize)> {
+        let (mut slam, known) = (self.slam(config)?, (share * self.len() as f64) as usize);
+        for shown in 0..known {
+            slam.track(&self.show(shown))?;
+        }
+        Ok((slam, known))
+    }
+
     /// The error of a trajectory of what was shown, RMSE after alignment by SE(3), m.
     pub fn ate_m(&self, trajectory: &[(i64, Isometry3<f64>)]) -> Result<f64> {
         let estimate: Vec<_> = trajectory.iter().map(|(t, pose)| StampedPose::new(*t, *pose)).collect();

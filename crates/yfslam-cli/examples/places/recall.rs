@@ -30,11 +30,7 @@ pub fn table(config: &Config, mapped: f64, films: impl Iterator<Item = Result<Fi
     println!("|---|---|---|---|---|---|---|");
     for film in films {
         let film = film?;
-        let known = (mapped * film.len() as f64) as usize;
-        let mut slam = film.slam(config)?;
-        for shown in 0..known {
-            slam.track(&film.show(shown))?;
-        }
+        let (slam, known) = film.mapped(config, mapped)?;
         let map = slam.map();
         let is_near = |id: KeyFrameId, stamp_ns: i64| {
             let at = map.keyframe(id).and_then(|k| film.truth_at(k.timestamp_ns)).zip(film.truth_at(stamp_ns));

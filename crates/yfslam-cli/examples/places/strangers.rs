@@ -21,11 +21,7 @@ pub fn table(config: &Config, mapped: f64, films: impl Iterator<Item = Result<Fi
     println!("|---|---|---|---|---|---|---|---|");
     for film in films {
         let film = film?;
-        let known = (mapped * film.len() as f64) as usize;
-        let mut slam = film.slam(config)?;
-        for shown in 0..known {
-            slam.track(&film.show(shown))?;
-        }
+        let (slam, known) = film.mapped(config, mapped)?;
         let estimate: Vec<_> = slam.trajectory().iter().map(|(t, pose)| StampedPose::new(*t, *pose)).collect();
         let truth: Vec<_> = (0..film.len())
             .filter_map(|shown| Some(StampedPose::new(film.stamp_ns(shown), film.truth_at(film.stamp_ns(shown))?)))

@@ -23,7 +23,7 @@ impl Config {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let share = |x: f64| (0.0..=1.0).contains(&x);
         let (f, d, s, t) = (&self.features, &self.depth, &self.stereo, &self.tracking);
-        let checks: [(&'static str, String, bool, &'static str); 25] = [
+        let checks: [(&'static str, String, bool, &'static str); 28] = [
             ("features.count", f.count.to_string(), f.count > 0, "at least 1"),
             ("features.levels", f.levels.to_string(), (1..=16).contains(&f.levels), "from 1 to 16"),
             (
@@ -96,6 +96,24 @@ impl Config {
                 self.dynamic.group_half_width_m.to_string(),
                 positive(self.dynamic.group_half_width_m.into()),
                 "a positive length in m",
+            ),
+            (
+                "dynamic.full.max_jump_m",
+                self.dynamic.full.max_jump_m.to_string(),
+                positive(self.dynamic.full.max_jump_m.into()),
+                "a positive length in m",
+            ),
+            (
+                "dynamic.full.whole_share",
+                self.dynamic.full.whole_share.to_string(),
+                share(self.dynamic.full.whole_share.into()),
+                "from 0 to 1",
+            ),
+            (
+                "dynamic.full.hidden_share",
+                self.dynamic.full.hidden_share.to_string(),
+                share(self.dynamic.full.hidden_share.into()),
+                "from 0 to 1",
             ),
             (
                 "dynamic.max_extra_features",

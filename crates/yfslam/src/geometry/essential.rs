@@ -20,10 +20,15 @@ pub fn motions_of_essential(e: &Matrix3<f64>) -> Vec<Pose> {
         if !rotation.iter().all(|v| v.is_finite()) {
             return Vec::new();
         }
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-        motions.extend([baseline, -baseline].map(|t| Pose::from_parts(Translation3::from(t), rotation)));
+        motions.extend(both_ways(rotation, baseline));
     }
     motions
+}
+
+/// The motions of a rotation and a baseline whose sense is open.
+pub(super) fn both_ways(rotation: Matrix3<f64>, baseline: Vector3<f64>) -> [Pose; 2] {
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+    [baseline, -baseline].map(|t| Pose::from_parts(Translation3::from(t), rotation))
 }
 
 #[cfg(test)]

@@ -49,7 +49,26 @@ pub fn epipolar_distance(f: &Matrix3<f64>, ([x1, y1], [x2, y2]): &Pair) -> f64 {
 
 /// The normalised eight-point algorithm; `None` if the pairs do not determine F.
 pub fn eight_point(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f64>> {
-    if pairs.clone().count() < 8 {
+    let row = |a: &Vector3<f64>, b: &Vector3<f64>| {
+        [SMatrix::from([b.x * a.x, b.x * a.y, b.x, b.y * a.x, b.y * a.y, b.y, a.x, a.y, 1.0])]
+    };
+    let [to_unit_1, f, to_unit_2] = direct_linear(pairs, 8, row)?;
+    let mut svd = f.svd(true, true);
+    let smallest = svd.singular_values.imin();
+    svd.singular_values[smallest] = 0.0;
+    let f = svd.recompose().ok()?;
+    let f = to_unit_2.transpose() * f * to_unit_1;
+    f.iter().all(|v| v.is_finite()).then_some(f)
+}
+
+/// The matrix whose nine numbers come nearest to solving `rows` for all pairs, of which there must be `at_least` so many; rows are made of the
+/// normalised positions in the first and the second picture. Before and after it, what normalises those of each.
+pub(super) fn direct_linear<const ROWS: usize>(
+    pairs: impl Iterator<Item = Pair> + Clone,
+    at_least: usize,
+    rows: impl Fn(&Vector3<f64>, &Vector3<f64>) -> [SMatrix<f64, 9, 1>; ROWS],
+) -> Option<[Matrix3<f64>; 3]> {
+    if pairs.clone().count() < at_least {
         return None;
     }
     let to_unit_1 = normalisation(pairs.clone().map(|pair| pair.0))?;
@@ -58,21 +77,17 @@ pub fn eight_point(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<
     for ([x1, y1], [x2, y2]) in pairs {
         let a = to_unit_1 * Vector3::new(f64::from(x1), f64::from(y1), 1.0);
         let b = to_unit_2 * Vector3::new(f64::from(x2), f64::from(y2), 1.0);
-        let row = SMatrix::<f64, 9, 1>::from([b.x * a.x, b.x * a.y, b.x, b.y * a.x, b.y * a.y, b.y, a.x, a.y, 1.0]);
-        normal += row * row.transpose();
+        for row in rows(&a, &b) {
+            normal += row * row.transpose();
+        }
     }
     let eigen = SymmetricEigen::new(normal);
-    let f = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-    let mut svd = Matrix3::from_row_slice(f.as_slice()).svd(true, true);
-    let smallest = svd.singular_values.imin();
-    svd.singular_values[smallest] = 0.0;
-    let f = svd.recompose().ok()?;
-    let f = to_unit_2.transpose() * f * to_unit_1;
-    f.iter().all(|v| v.is_finite()).then_some(f)
+    let solution = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+    Some([to_unit_1, Matrix3::from_row_slice(solution.as_slice()), to_unit_2])
 }
 
 /// Moves the mean of positions to 0 and their mean distance from it to √2.
-pub(super) fn normalisation(positions: impl Iterator<Item = [f32; 2]> + Clone) -> Option<Matrix3<f64>> {
+fn normalisation(positions: impl Iterator<Item = [f32; 2]> + Clone) -> Option<Matrix3<f64>> {
     let count = positions.clone().count() as f64;
     let (sx, sy) = positions.clone().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p[0]), y + f64::from(p[1])));
     let (mx, my) = (sx / count, sy / count);

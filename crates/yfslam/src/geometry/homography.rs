@@ -3,9 +3,10 @@
 //!
 //! In: positions of the same points in both. Out: the matrix H with x₂ ~ H x₁ for points of one plane; of that, motions.
 
-use nalgebra::{Matrix3, Rotation3, SMatrix, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::fundamental::{Pair, normalisation};
+use super::essential::both_ways;
+use super::fundamental::{Pair, direct_linear};
 use crate::geometry::Pose;
 
 /// Spread of the singular values of a homography, relative to the middle one, below which it is a rotation alone.
@@ -13,25 +14,16 @@ const MIN_SPREAD: f64 = 1e-6;
 
 /// The normalised direct linear transform; `None` if the pairs do not determine H.
 pub fn homography(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f64>> {
-    if pairs.clone().count() < 4 {
-        return None;
-    }
-    let to_unit_1 = normalisation(pairs.clone().map(|pair| pair.0))?;
-    let to_unit_2 = normalisation(pairs.clone().map(|pair| pair.1))?;
-    let mut normal = SMatrix::<f64, 9, 9>::zeros();
-    for ([x1, y1], [x2, y2]) in pairs {
-        let a = to_unit_1 * Vector3::new(f64::from(x1), f64::from(y1), 1.0);
-        let b = to_unit_2 * Vector3::new(f64::from(x2), f64::from(y2), 1.0);
-        for (scale, row_of) in [(b.x, 0), (b.y, 3)] {
+    let rows = |a: &Vector3<f64>, b: &Vector3<f64>| {
+        [(b.x, 0), (b.y, 3)].map(|(scale, row_of)| {
             let mut row = SMatrix::<f64, 9, 1>::zeros();
-            row.fixed_rows_mut::<3>(row_of).copy_from(&a);
+            row.fixed_rows_mut::<3>(row_of).copy_from(a);
             row.fixed_rows_mut::<3>(6).copy_from(&(-scale * a));
-            normal += row * row.transpose();
-        }
-    }
-    let eigen = SymmetricEigen::new(normal);
-    let h = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-    let h = to_unit_2.try_inverse()? * Matrix3::from_row_slice(h.as_slice()) * to_unit_1;
+            row
+        })
+    };
+    let [to_unit_1, h, to_unit_2] = direct_linear(pairs, 4, rows)?;
+    let h = to_unit_2.try_inverse()? * h * to_unit_1;
     h.iter().all(|v| v.is_finite()).then_some(h)
 }
 
@@ -63,8 +55,7 @@ pub fn motions_of_homography(h: &Matrix3<f64>) -> Vec<Pose> {
         let (a, b) = (h * v2, h * u);
         let rotation = Matrix3::from_columns(&[a, b, a.cross(&b)]) * before.transpose();
         let Some(baseline) = ((h - rotation) * normal).try_normalize(1e-9) else { continue };
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-        motions.extend([baseline, -baseline].map(|t| Pose::from_parts(Translation3::from(t), rotation)));
+        motions.extend(both_ways(rotation, baseline));
     }
     motions
 }
