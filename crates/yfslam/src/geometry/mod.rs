@@ -1,4 +1,4 @@
-//! Rigid motions and the pinhole model in the form the optimisers need.
+//! Rigid motions, similarities and the pinhole model in the form the optimisers need.
 
 mod essential;
 mod fundamental;
@@ -6,6 +6,7 @@ mod homography;
 mod p3p;
 mod pinhole;
 mod se3;
+mod sim3;
 mod triangulate;
 mod two_view;
 
@@ -15,6 +16,10 @@ pub use homography::{homography, motions_of_homography, transfer_distance2};
 pub use p3p::p3p;
 pub use pinhole::Pinhole;
 pub use se3::{perturbed, se3_exp, se3_log, skew};
+pub use sim3::{
+    Similarity, Tangent, TangentMap, absolute_orientation, rigid, sim3_adjoint, sim3_from_tangent, sim3_perturbed,
+    sim3_tangent, unscaled, with_scale,
+};
 pub use triangulate::midpoint;
 pub use two_view::{Model, Refused, TwoView, reconstruct};
 
