@@ -67,7 +67,7 @@ fn play(film: &Film, config: &Config, count: usize) -> Result<(Slam, Vec<Judged>
             (error.translation.vector.norm(), error.rotation.angle().to_degrees())
         };
         let error = truth_of(closed.keyframe).zip(truth_of(closed.to)).map(|(near, far)| error(near, far));
-        loops.push(Judged { shown, drift_m: closed.drift.translation.vector.norm(), error });
+        loops.push(Judged { shown, drift_m: closed.drift.isometry.translation.vector.norm(), error });
     }
     Ok((slam, loops, tracked))
 }

@@ -55,7 +55,8 @@ impl PlaceTally {
 
     /// Takes account of a loop.
     pub fn close(&mut self, timestamp_ns: i64, closed: &LoopClosed) {
-        let (drift_m, drift_deg) = (closed.drift.translation.vector.norm(), closed.drift.rotation.angle().to_degrees());
+        let (drift_m, drift_deg) =
+            (closed.drift.isometry.translation.vector.norm(), closed.drift.isometry.rotation.angle().to_degrees());
         let LoopClosed { inliers, merged_submaps, .. } = *closed;
         tracing::info!(inliers, drift_m, drift_deg, merged_submaps, "loop closed");
         self.loops.push(Loop { timestamp_ns, inliers, drift_m, drift_deg, merged_submaps });

@@ -52,13 +52,15 @@ config_section! {
         /// Stands in the place of `tracking.reset_after_s` for a map of at most `tracking.reset_max_keyframes`, s. A larger one is never
         /// left: a new one would have another scale.
         reset_after_s: f64 = 0.5,
+        /// Landmarks of a keyframe and of an old place that must agree on the similarity between them. Source: ORB-SLAM2.
+        loop_min_pairs: usize = 20,
         /// Seed of the random draws.
         seed: u64 = 0,
     }
 }
 
 impl Config {
-    /// The configuration as the stages use it: without depth, what section `monocular` says in the place of other keys, and no loops.
+    /// The configuration as the stages use it: without depth, what section `monocular` says in the place of other keys.
     pub fn for_sensor(mut self) -> Self {
         if self.depth.source == DepthSource::Motion {
             let m = &self.monocular;
@@ -69,8 +71,6 @@ impl Config {
             self.tracking.reset_after_s = m.reset_after_s;
             self.mapping.triangulation_neighbours = m.triangulation_neighbours;
             self.mapping.min_observation_weight = m.min_observation_weight;
-            // A loop would have to take away the drift of the scale, too.
-            self.loops.enabled = false;
         }
         self
     }

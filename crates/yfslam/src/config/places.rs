@@ -49,7 +49,7 @@ config_section! {
 config_section! {
     /// Closing loops (ORB-SLAM, IEEE T-RO 2015, section VII; ORB-SLAM2, IEEE T-RO 2017, section III-C).
     LoopConfig {
-        /// Whether loops are closed. Without depth none are: the scale would drift, too, and is not corrected.
+        /// Whether loops are closed: by a rigid motion, without depth by a similarity.
         enabled: bool = true,
         /// Keyframes in a row that must agree on the old place. Source: ORB-SLAM.
         min_consistent: usize = 3,

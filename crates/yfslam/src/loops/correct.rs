@@ -8,7 +8,7 @@ use slotmap::SecondaryMap;
 
 use super::recognise::Candidate;
 use crate::config::Config;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Similarity, rigid, unscaled};
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::mapping::fuse;
 use crate::optimize::pose_graph::{Edge, PoseGraph};
@@ -21,15 +21,16 @@ struct Loop {
     near: Vec<KeyFrameId>,
     /// Poses before the correction, `t_cam_world`.
     before: SecondaryMap<KeyFrameId, Pose>,
-    /// Poses of the near side as the far side has them.
-    moved: SecondaryMap<KeyFrameId, Pose>,
+    /// Poses of the near side as the far side has them, `s_cam_world`, into the unit that the near side has.
+    moved: SecondaryMap<KeyFrameId, Similarity>,
     /// Landmarks that moved with a keyframe of the near side.
     carried: SecondaryMap<LandmarkId, KeyFrameId>,
     /// Pairs of a near and a far keyframe that came to share landmarks.
     links: Vec<(KeyFrameId, KeyFrameId)>,
 }
 
-/// Closes the loop between `keyframe` and the place of `candidate`, in which it was located as `located`.
+/// Closes the loop between `keyframe` and the place of `candidate`, in which it was located as `located`: there, `s_cam_place` maps the
+/// place's world into its camera and unit.
 pub fn close(
     sensor: &SensorModel,
     config: &Config,
@@ -37,14 +38,17 @@ pub fn close(
     keyframe: KeyFrameId,
     candidate: &Candidate,
     located: &TrackedFrame,
+    s_cam_place: &Similarity,
 ) {
     let Some(k) = map.keyframe(keyframe) else { return };
-    let t_far_near = located.t_cam_world.inverse() * k.t_cam_world;
+    let s_far_near = s_cam_place.inverse() * k.t_cam_world;
     let is_one_map = map.root(keyframe) == map.root(candidate.keyframe);
     if !is_one_map {
-        map.weld(keyframe, candidate.keyframe, &t_far_near);
+        map.weld(keyframe, candidate.keyframe, &s_far_near);
     }
-    let Some(mut ends) = Loop::new(map, keyframe, &located.t_cam_world) else { return };
+    // Once welded, both have the same unit.
+    let s_cam_world = if is_one_map { *s_cam_place } else { unscaled(&rigid(s_cam_place)) };
+    let Some(mut ends) = Loop::new(map, keyframe, &s_cam_world) else { return };
     ends.move_near_side(map);
     ends.join(sensor, config, map, keyframe, candidate, located);
     map.add_loop_edge(keyframe, candidate.keyframe);
@@ -54,16 +58,16 @@ pub fn close(
 }
 
 impl Loop {
-    fn new(map: &Map, keyframe: KeyFrameId, t_cam_world: &Pose) -> Option<Self> {
+    fn new(map: &Map, keyframe: KeyFrameId, s_cam_world: &Similarity) -> Option<Self> {
         let k = map.keyframe(keyframe)?;
         let near: Vec<KeyFrameId> = std::iter::once(keyframe).chain(k.covisible.iter().map(|(id, _)| *id)).collect();
-        let correction = k.t_cam_world.inverse() * t_cam_world;
+        let correction = k.t_cam_world.inverse() * s_cam_world;
         let before: SecondaryMap<KeyFrameId, Pose> = map.keyframes().map(|(id, k)| (id, k.t_cam_world)).collect();
         let moved = near.iter().filter_map(|id| Some((*id, *before.get(*id)? * correction))).collect();
         Some(Self { near, before, moved, carried: SecondaryMap::new(), links: Vec::new() })
     }
 
-    /// Moves the keyframes of the near side, rigidly, with all landmarks they see.
+    /// Moves the keyframes of the near side, all in the same way, with all landmarks they see.
     fn move_near_side(&mut self, map: &mut Map) {
         for &id in &self.near {
             let (Some(&old), Some(&new)) = (self.before.get(id), self.moved.get(id)) else { continue };
@@ -75,7 +79,7 @@ impl Loop {
                     map.set_position(landmark, new.inverse() * (old * position));
                 }
             }
-            map.set_pose(id, new);
+            map.set_pose(id, rigid(&new));
         }
     }
 
@@ -126,7 +130,8 @@ impl Loop {
         order.sort_unstable();
         let order: Vec<KeyFrameId> = order.into_iter().map(|(.., id)| id).collect();
         let index: SecondaryMap<KeyFrameId, usize> = order.iter().enumerate().map(|(i, id)| (*id, i)).collect();
-        let base = |id: KeyFrameId| self.moved.get(id).or(self.before.get(id)).copied();
+        let before = |id: KeyFrameId| self.before.get(id).map(unscaled);
+        let base = |id: KeyFrameId| self.moved.get(id).copied().or_else(|| before(id));
         let is_link = |a, b| self.links.binary_search(&(a, b)).is_ok() || self.links.binary_search(&(b, a)).is_ok();
         let mut graph = PoseGraph::default();
         for &a in &order {
@@ -140,13 +145,13 @@ impl Loop {
             for b in others {
                 // Each pair once, from its later member; links are the new measurements, the rest keeps its shape.
                 let (Some(&i), Some(&j)) = (index.get(a), index.get(b)) else { continue };
-                let pose_of = |id| if is_link(a, b) { base(id) } else { self.before.get(id).copied() };
-                if let (true, Some(t_a), Some(t_b)) = (i > j || keyframe.parent == Some(b), pose_of(a), pose_of(b)) {
-                    graph.edges.push(Edge { a: i, b: j, t_a_b: t_a * t_b.inverse() });
+                let pose_of = |id| if is_link(a, b) { base(id) } else { before(id) };
+                if let (true, Some(s_a), Some(s_b)) = (i > j || keyframe.parent == Some(b), pose_of(a), pose_of(b)) {
+                    graph.edges.push(Edge { a: i, b: j, s_a_b: s_a * s_b.inverse() });
                 }
             }
         }
-        graph.solve(&config.pose_graph);
+        graph.solve(&config.pose_graph, !sensor.measures_depth);
         for id in map.landmarks_of(&members) {
             let Some(landmark) = map.landmark(id) else { continue };
             let anchor = self.carried.get(id).copied().unwrap_or(landmark.reference);
@@ -156,7 +161,7 @@ impl Loop {
             map.update_landmark(id, &sensor.scale_factors);
         }
         for (id, pose) in order.iter().zip(&graph.poses) {
-            map.set_pose(*id, *pose);
+            map.set_scaled_pose(*id, pose);
         }
     }
 }

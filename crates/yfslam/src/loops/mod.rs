@@ -2,8 +2,8 @@
 //! IEEE T-RO 2017, section III-C), without a vocabulary.
 //!
 //! ```text
-//! features ─► recognise ─► verify ─► correct
-//!             which place?  P3P       join, pose graph ─► whole: bundle adjustment
+//! features ─► recognise ─► verify ─► similarity ─► correct
+//!             which place?  P3P      without depth  join, pose graph ─► whole: bundle adjustment
 //! ```
 //!
 //! In: keyframes, and frames whose pose is unknown. Out: poses, and a map without the drift of a way that led back.
@@ -12,6 +12,7 @@ mod correct;
 mod index;
 mod plausible;
 mod recognise;
+mod similarity;
 mod verify;
 mod whole;
 
@@ -21,7 +22,7 @@ use nalgebra::Point3;
 use slotmap::SecondaryMap;
 
 use crate::config::Config;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Similarity, rigid, unscaled};
 use crate::map::{KeyFrame, KeyFrameId, Map};
 use crate::sensor::SensorModel;
 use crate::tracking::{Sight, TrackedFrame};
@@ -39,8 +40,9 @@ pub struct LoopClosed {
     pub to: KeyFrameId,
     /// Landmarks of the old place that fit.
     pub inliers: usize,
-    /// How the keyframe's estimate differed from the old place's: `t_estimated_located`, in the camera's frame.
-    pub drift: Pose,
+    /// How the keyframe's estimate differed from the old place's: `s_estimated_located`, in the camera's frame. Its scale is 1 where depth
+    /// is measured; else it is by how much the map around the keyframe was too large.
+    pub drift: Similarity,
     /// The motion between the two, as measured.
     pub t_keyframe_to: Pose,
     /// Whether the old place was of another submap, so that two became one: `drift` is then the motion between their worlds.
@@ -138,15 +140,16 @@ impl LoopCloser {
             let needed = Evidence { inliers: c.min_inliers, likeness: c.min_likeness };
             let found = verify::locate(sensor, config, map, &place, &mut self.frame, &needed);
             let Some(evidence) = found else { continue };
-            let drift = estimated * self.frame.t_cam_world.inverse();
+            let Some(s_cam_place) = self.place_seen_from(sensor, config, map, keyframe, &place) else { continue };
+            let drift = estimated * s_cam_place.inverse();
             let plausible = plausible::is_plausible(c, map, keyframe, place.keyframe, &drift);
             tracing::debug!(?evidence, %drift, plausible, "an old place");
             if !plausible && evidence.likeness < c.min_likeness_of_jump {
                 continue;
             }
-            let t_keyframe_to = self.frame.t_cam_world * map.keyframe(place.keyframe)?.t_cam_world.inverse();
+            let t_keyframe_to = rigid(&s_cam_place) * map.keyframe(place.keyframe)?.t_cam_world.inverse();
             let merged_submaps = map.root(keyframe) != map.root(place.keyframe);
-            correct::close(sensor, config, map, keyframe, &place, &self.frame);
+            correct::close(sensor, config, map, keyframe, &place, &self.frame, &s_cam_place);
             self.last_loop = Some(sequence);
             self.consistent.clear();
             return Some(LoopClosed {
@@ -159,6 +162,21 @@ impl LoopCloser {
             });
         }
         None
+    }
+
+    /// Where the world of the old place is in the camera that was located there, in the unit of the keyframe.
+    fn place_seen_from(
+        &self,
+        sensor: &SensorModel,
+        config: &Config,
+        map: &Map,
+        keyframe: KeyFrameId,
+        place: &Candidate,
+    ) -> Option<Similarity> {
+        if sensor.measures_depth {
+            return Some(unscaled(&self.frame.t_cam_world));
+        }
+        similarity::measure(sensor, config, map, keyframe, place, &self.frame)
     }
 
     /// Those candidates that the last keyframes agreed on: a candidate agrees with an earlier one if their groups overlap.

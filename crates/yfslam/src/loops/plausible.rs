@@ -9,13 +9,14 @@ use std::collections::BinaryHeap;
 use slotmap::SecondaryMap;
 
 use crate::config::LoopConfig;
-use crate::geometry::Pose;
+use crate::geometry::Similarity;
 use crate::map::{KeyFrameId, Map};
 
 /// Whether the camera can have drifted by `drift` between the two keyframes.
-pub fn is_plausible(config: &LoopConfig, map: &Map, from: KeyFrameId, to: KeyFrameId, drift: &Pose) -> bool {
+pub fn is_plausible(config: &LoopConfig, map: &Map, from: KeyFrameId, to: KeyFrameId, drift: &Similarity) -> bool {
     // Between two submaps there is no way, and nothing to be explained by it.
     let Some(way) = way_between(map, from, to) else { return false };
+    let drift = drift.isometry;
     let (shift_m, turn_deg) = (drift.translation.vector.norm(), drift.rotation.angle().to_degrees());
     shift_m <= config.max_drift_m + config.max_drift_m_per_m * way
         && turn_deg <= config.max_drift_deg + config.max_drift_deg_per_m * way
@@ -52,6 +53,7 @@ fn way_between(map: &Map, from: KeyFrameId, to: KeyFrameId) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds};
+    use crate::geometry::{Pose, unscaled};
     use nalgebra::{Point3, Vector3};
 
     /// Keyframes a metre apart along a way, each of which shares landmarks with the next.
@@ -90,7 +92,7 @@ mod tests {
         let (map, ids) = walk(20);
         assert!((way_between(&map, ids[0], ids[20]).unwrap() - 20.0).abs() < 1e-4);
         let c = LoopConfig::default();
-        let explained = |end: usize, drift: Pose| is_plausible(&c, &map, ids[0], ids[end], &drift);
+        let explained = |end: usize, drift: Pose| is_plausible(&c, &map, ids[0], ids[end], &unscaled(&drift));
         let shift = Pose::translation(0.0, 0.8, 0.0);
         assert!(explained(20, shift) && !explained(5, shift));
         let turn = Pose::rotation(Vector3::new(0.0, 0.2, 0.0));

@@ -46,7 +46,14 @@ pub fn locate(
 ) -> Option<Evidence> {
     let c = &config.places;
     let pairs: Vec<Pair> = candidate.matches.iter().filter_map(|m| Pair::new(sensor, map, frame, *m)).collect();
-    let pose = ransac(sensor, c, &pairs)?;
+    // Depth, where measured, tells the true one of the solutions.
+    let pose = ransac(
+        c,
+        pairs.len(),
+        c.min_ransac_inliers,
+        |sample| p3p(&sample.map(|i| pairs[i].point_world), &sample.map(|i| pairs[i].ray)),
+        |pose, i| pairs[i].fits(sensor, pose),
+    )?;
     frame.clear_sights();
     frame.t_cam_world = pose;
     for pair in pairs.iter().filter(|pair| pair.fits(sensor, &pose)) {
@@ -145,38 +152,44 @@ impl Pair {
     }
 }
 
-/// The pose that most pairs fit, if enough do. Draws end when a better pose has become unlikely.
-fn ransac(sensor: &SensorModel, config: &PlaceConfig, pairs: &[Pair]) -> Option<Pose> {
-    let count = pairs.len();
-    if count < config.min_ransac_inliers.max(3) {
+/// The model that most of `count` pairs fit, if at least `min_inliers` do; models are made from three pairs each. Draws end when a better
+/// one has become unlikely.
+pub(super) fn ransac<M: Copy, I: IntoIterator<Item = M>>(
+    config: &PlaceConfig,
+    count: usize,
+    min_inliers: usize,
+    models: impl Fn([usize; 3]) -> I,
+    fits: impl Fn(&M, usize) -> bool,
+) -> Option<M> {
+    if count < min_inliers.max(3) {
         return None;
     }
     // Seeded anew for each call: a result depends on its input alone.
     let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
     let mut draw = || ((u64::from(rng.next_u32()) * count as u64) >> 32) as usize;
-    let mut best: Option<(usize, Pose)> = None;
+    let mut best: Option<(usize, M)> = None;
     let mut draws = config.max_draws as f64;
     let mut drawn = 0;
     while f64::from(drawn) < draws {
         drawn += 1;
-        let [a, b, c] = [draw(), draw(), draw()];
+        let sample = [draw(), draw(), draw()];
+        let [a, b, c] = sample;
         if a == b || a == c || b == c {
             continue;
         }
-        let sample = [&pairs[a], &pairs[b], &pairs[c]];
-        for pose in p3p(&sample.map(|pair| pair.point_world), &sample.map(|pair| pair.ray)) {
-            // Depth, where measured, tells the true one of the solutions.
-            if !sample.iter().all(|pair| pair.fits(sensor, &pose)) {
+        for model in models(sample) {
+            // What does not even explain its own three pairs, where they tell more than it was made from, is wrong.
+            if !sample.iter().all(|i| fits(&model, *i)) {
                 continue;
             }
-            let inliers = pairs.iter().filter(|pair| pair.fits(sensor, &pose)).count();
-            if best.is_none_or(|(most, _)| inliers > most) {
-                best = Some((inliers, pose));
+            let inliers = (0..count).filter(|i| fits(&model, *i)).count();
+            if best.as_ref().is_none_or(|(most, _)| inliers > *most) {
+                best = Some((inliers, model));
                 let share = inliers as f64 / count as f64;
                 let needed = (1.0 - config.confidence).ln() / (1.0 - share.powi(3)).max(1e-9).ln();
                 draws = draws.min(needed.ceil().max(1.0));
             }
         }
     }
-    best.filter(|(inliers, _)| *inliers >= config.min_ransac_inliers).map(|(_, pose)| pose)
+    best.filter(|(inliers, _)| *inliers >= min_inliers).map(|(_, model)| model)
 }

@@ -18,6 +18,8 @@ pub struct KeyFrame {
     pub sequence: u64,
     /// Maps world points into this camera.
     pub t_cam_world: Pose,
+    /// The unit of length that it was mapped in, in that of the map now: 1, unless a loop has changed the scale of a map without depth.
+    pub unit: f64,
     /// What was seen.
     pub features: FrameFeatures,
     /// The landmark seen by each feature.

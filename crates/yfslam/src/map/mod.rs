@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 
 use slotmap::SlotMap;
 
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Similarity, rigid, unscaled, with_scale};
 pub use keyframe::{KeyFrame, KeyFrameId};
 pub use landmark::{Landmark, LandmarkId};
 
@@ -31,8 +31,8 @@ pub use landmark::{Landmark, LandmarkId};
 pub struct Map {
     keyframes: SlotMap<KeyFrameId, KeyFrame>,
     landmarks: SlotMap<LandmarkId, Landmark>,
-    /// What became of removed keyframes: an ancestor that stayed, and `t_removed_ancestor` at the time of removal.
-    removed: BTreeMap<KeyFrameId, (KeyFrameId, Pose)>,
+    /// What became of removed keyframes: an ancestor that stayed, and `s_removed_ancestor` at the time of removal, each in its unit.
+    removed: BTreeMap<KeyFrameId, (KeyFrameId, Similarity)>,
     keyframes_ever: u64,
 }
 
@@ -74,15 +74,32 @@ impl Map {
 
     /// Current `t_cam_world` of a keyframe; for a removed one by way of the ancestor it was tied to.
     pub fn keyframe_pose(&self, id: KeyFrameId) -> Option<Pose> {
-        let (mut id, mut t_asked_id) = (id, Pose::identity());
+        self.own_pose(id).map(|own| rigid(&own))
+    }
+
+    /// Current `s_cam_world` of a keyframe, removed or not, into the unit that it was mapped in.
+    fn own_pose(&self, id: KeyFrameId) -> Option<Similarity> {
+        let (mut id, mut s_asked_id) = (id, Similarity::identity());
         loop {
             if let Some(keyframe) = self.keyframes.get(id) {
-                return Some(t_asked_id * keyframe.t_cam_world);
+                return Some(s_asked_id * with_scale(&keyframe.t_cam_world, 1.0 / keyframe.unit));
             }
-            let (ancestor, t_id_ancestor) = self.removed.get(&id)?;
-            t_asked_id *= *t_id_ancestor;
+            let (ancestor, s_id_ancestor) = self.removed.get(&id)?;
+            s_asked_id *= *s_id_ancestor;
             id = *ancestor;
         }
+    }
+
+    /// A frame's pose seen from a keyframe, `t_cam_reference`, in the unit that the keyframe was mapped in: when the map is corrected, its
+    /// scale included, the frame follows ([`Map::tied_pose`]).
+    pub fn tie(&self, reference: KeyFrameId, t_cam_world: &Pose) -> Option<Pose> {
+        let own = self.own_pose(reference)?;
+        Some((with_scale(t_cam_world, own.scaling()) * own.inverse()).isometry)
+    }
+
+    /// Current `t_cam_world` of a frame that was tied to a keyframe.
+    pub fn tied_pose(&self, reference: KeyFrameId, t_cam_reference: &Pose) -> Option<Pose> {
+        Some(rigid(&(unscaled(t_cam_reference) * self.own_pose(reference)?)))
     }
 
     /// Whether any keyframe measured depth: else the unit of length is arbitrary.

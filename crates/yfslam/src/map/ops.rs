@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use slotmap::SecondaryMap;
 
 use crate::features::FrameFeatures;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Similarity, rigid};
 use crate::map::{KeyFrame, KeyFrameId, Landmark, LandmarkId, Map};
 
 /// Shared landmarks that make two keyframes covisible. Source: ORB-SLAM2.
@@ -20,6 +20,7 @@ impl Map {
             timestamp_ns,
             sequence,
             t_cam_world,
+            unit: 1.0,
             features,
             landmarks,
             covisible: Vec::new(),
@@ -166,6 +167,14 @@ impl Map {
         }
     }
 
+    /// Moves a keyframe to where a similarity has it, whose scale is that of the keyframe's unit now to the unit of the world.
+    pub fn set_scaled_pose(&mut self, keyframe: KeyFrameId, s_cam_world: &Similarity) {
+        if let Some(k) = self.keyframes.get_mut(keyframe) {
+            k.t_cam_world = rigid(s_cam_world);
+            k.unit /= s_cam_world.scaling();
+        }
+    }
+
     /// Counts a frame that should have seen the landmark.
     pub fn count_visible(&mut self, landmark: LandmarkId) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
@@ -240,6 +249,7 @@ impl Map {
         for landmark in sights {
             self.remove_observation(landmark, keyframe);
         }
+        let (Some(own), Some(above)) = (self.own_pose(keyframe), self.own_pose(parent)) else { return false };
         let Some(k) = self.keyframes.remove(keyframe) else { return false };
         for (other, _) in &k.covisible {
             self.keyframes[*other].covisible.retain(|(id, _)| *id != keyframe);
@@ -249,7 +259,7 @@ impl Map {
             self.keyframes[child].parent = Some(parent);
             self.keyframes[parent].children.push(child);
         }
-        self.removed.insert(keyframe, (parent, k.t_cam_world * self.keyframes[parent].t_cam_world.inverse()));
+        self.removed.insert(keyframe, (parent, own * above.inverse()));
         true
     }
 

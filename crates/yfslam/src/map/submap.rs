@@ -2,7 +2,7 @@
 //! world. A place that two of them show makes one of them (Atlas: Elvira, Tardós and Montiel, IROS 2019).
 
 use super::{KeyFrameId, LandmarkId, Map};
-use crate::geometry::Pose;
+use crate::geometry::{Similarity, unscaled};
 
 impl Map {
     /// The root of the submap that a keyframe belongs to: the keyframe that defines its world.
@@ -56,9 +56,9 @@ impl Map {
         landmarks
     }
 
-    /// Takes the submap of `keyframe` into the world of that of `parent`: everything in it moves by `t_parents_keyframes`, from its
-    /// own world into the other one, and its tree hangs below `parent` by `keyframe`. Does nothing if they are of one submap.
-    pub fn weld(&mut self, keyframe: KeyFrameId, parent: KeyFrameId, t_parents_keyframes: &Pose) {
+    /// Takes the submap of `keyframe` into the world of that of `parent`: everything in it moves by `s_parents_keyframes`, from its
+    /// own world and unit into the other one, and its tree hangs below `parent` by `keyframe`. Does nothing if they are of one submap.
+    pub fn weld(&mut self, keyframe: KeyFrameId, parent: KeyFrameId, s_parents_keyframes: &Similarity) {
         let (Some(root), Some(other)) = (self.root(keyframe), self.root(parent)) else { return };
         if root == other || !self.keyframes.contains_key(keyframe) || !self.keyframes.contains_key(parent) {
             return;
@@ -66,12 +66,15 @@ impl Map {
         let members = self.submap(root);
         for id in self.landmarks_of(&members) {
             let landmark = &mut self.landmarks[id];
-            landmark.position = t_parents_keyframes * landmark.position;
-            landmark.normal = t_parents_keyframes.rotation * landmark.normal;
+            landmark.position = s_parents_keyframes * landmark.position;
+            landmark.normal = s_parents_keyframes.isometry.rotation * landmark.normal;
+            landmark.max_distance_m *= s_parents_keyframes.scaling();
+            landmark.min_distance_m *= s_parents_keyframes.scaling();
         }
-        let back = t_parents_keyframes.inverse();
+        let back = s_parents_keyframes.inverse();
         for id in members {
-            self.keyframes[id].t_cam_world *= back;
+            let moved = unscaled(&self.keyframes[id].t_cam_world) * back;
+            self.set_scaled_pose(id, &moved);
         }
         // The way from the keyframe up to its root turns round; all else hangs where it hung.
         let (mut id, mut parent) = (keyframe, parent);
@@ -104,7 +107,7 @@ impl Map {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::se3_exp;
+    use crate::geometry::{Pose, se3_exp, sim3_from_tangent};
     use crate::map::scene::Scene;
     use nalgebra::Vector6;
 
@@ -127,7 +130,7 @@ mod tests {
         let (scene, mut map, first, second, other_world) = apart();
         assert_eq!((map.validate(), map.submap_count()), (Ok(()), 2));
         assert_eq!(map.submap_size(second[3], 9), 4);
-        map.weld(second[3], first[3], &other_world);
+        map.weld(second[3], first[3], &unscaled(&other_world));
         assert_eq!((map.validate(), map.submap_count()), (Ok(()), 1));
         assert_eq!(map.root(second[0]), Some(first[0]));
         assert_eq!(map.keyframe(second[3]).unwrap().parent, Some(first[3]));
@@ -142,8 +145,45 @@ mod tests {
             }
         }
         // Welded once, it is of the same submap.
-        map.weld(second[3], first[0], &other_world);
+        map.weld(second[3], first[0], &unscaled(&other_world));
         assert_eq!(map.keyframe(second[3]).unwrap().parent, Some(first[3]));
+    }
+
+    #[test]
+    fn a_submap_welded_at_another_scale_shows_the_same_and_what_hung_on_it_comes_along() {
+        let (scene, mut map, first, second, _) = apart();
+        let s_first_second = sim3_from_tangent(&[0.4, -1.0, 0.3, 0.1, 0.8, -0.2, 0.7].into());
+        let near = se3_exp(&Vector6::new(0.1, 0.05, -0.1, 0.02, 0.0, 0.01));
+        // A frame that hangs on a keyframe that is removed, and keyframe and frame as they are before.
+        let t_cam_world = near * map.keyframe_pose(second[1]).unwrap();
+        let tie = map.tie(second[1], &t_cam_world).unwrap();
+        let removed = map.keyframe_pose(second[1]).unwrap();
+        assert!(map.remove_keyframe(second[1]));
+        let own: Vec<_> =
+            map.landmarks_of(&second).iter().map(|id| (*id, map.landmark(*id).unwrap().clone())).collect();
+        map.weld(second[3], first[3], &s_first_second);
+        assert_eq!(map.validate(), Ok(()));
+        let center = |pose: &Pose| pose.inverse() * nalgebra::Point3::origin();
+        let moved = |before: &Pose, after: &Pose| {
+            let turned = before.rotation * s_first_second.isometry.rotation.inverse();
+            (s_first_second * center(before) - center(after)).norm() < 1e-9 && turned.angle_to(&after.rotation) < 1e-7
+        };
+        assert!(moved(&removed, &map.keyframe_pose(second[1]).unwrap()));
+        assert!(moved(&t_cam_world, &map.tied_pose(second[1], &tie).unwrap()));
+        // What is tied from now on is so in the unit that the keyframe was mapped in, too.
+        let now = map.tied_pose(second[1], &tie).unwrap();
+        assert!((map.tie(second[1], &now).unwrap() * tie.inverse()).translation.vector.norm() < 1e-9);
+        for (id, before) in &own {
+            let after = map.landmark(*id).unwrap();
+            assert!((s_first_second * before.position - after.position).norm() < 1e-9);
+            assert!((after.max_distance_m / before.max_distance_m - s_first_second.scaling()).abs() < 1e-9);
+            for &(k, f) in &after.observations {
+                let keyframe = map.keyframe(k).unwrap();
+                let [u, v] = scene.sensor.pinhole.project(&(keyframe.t_cam_world * after.position).coords);
+                let seen = &keyframe.features.features[f as usize];
+                assert!((u - f64::from(seen.u)).hypot(v - f64::from(seen.v)) < 1e-3);
+            }
+        }
     }
 
     #[test]
@@ -160,7 +200,7 @@ mod tests {
     #[test]
     fn a_welded_map_is_read_back_as_one() {
         let (_, mut map, first, second, other_world) = apart();
-        map.weld(second[3], first[3], &other_world);
+        map.weld(second[3], first[3], &unscaled(&other_world));
         let features = crate::config::FeatureConfig { levels: 1, ..Default::default() };
         let bytes = crate::map::persist::encode(&map, &crate::map::scene::camera(), &features).unwrap();
         let read = crate::map::persist::decode(&bytes).unwrap().map;

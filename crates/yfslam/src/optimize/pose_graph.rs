@@ -1,15 +1,21 @@
 //! Pose-graph optimisation over SE(3) (Kümmerle et al., g2o, ICRA 2011; Jacobians after Barfoot, State Estimation for Robotics, section
-//! 7.1): a loop's error is spread over the poses between its ends.
+//! 7.1) and over Sim(3), where the scale drifts, too (Strasdat, Montiel and Davison, RSS 2010): a loop's error is spread over the poses
+//! between its ends.
 //!
 //! In: poses, and motions measured between pairs of them. Out: the poses that fit those best. The normal equations are sparse; they are
 //! solved by sparse Cholesky in the order of the poses, which for a path with few loops fills in little.
 
-use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use nalgebra_sparse::factorization::CscCholesky;
 use nalgebra_sparse::{CooMatrix, CscMatrix};
 
 use crate::config::PoseGraphConfig;
-use crate::geometry::{Pose, perturbed, se3_log, skew};
+use crate::geometry::{Similarity, Tangent, TangentMap, sim3_adjoint, sim3_perturbed, sim3_tangent, skew};
+
+/// Parameters of a pose whose scale is known.
+const RIGID: usize = 6;
+/// Parameters of a pose whose scale is not.
+const SCALED: usize = 7;
 
 /// A motion measured between two poses.
 #[derive(Clone, Copy, Debug)]
@@ -18,31 +24,36 @@ pub struct Edge {
     pub a: usize,
     /// Index of pose b.
     pub b: usize,
-    /// The motion `t_a_b`.
-    pub t_a_b: Pose,
+    /// The motion `s_a_b`.
+    pub s_a_b: Similarity,
 }
 
 /// Poses and the motions between them.
 #[derive(Clone, Debug, Default)]
 pub struct PoseGraph {
-    /// `t_a_world` of each pose; the first stays where it is.
-    pub poses: Vec<Pose>,
+    /// `s_a_world` of each pose; the first stays where it is.
+    pub poses: Vec<Similarity>,
     /// Motions measured.
     pub edges: Vec<Edge>,
 }
 
 impl PoseGraph {
-    /// Minimises the squared errors of all edges by Levenberg-Marquardt; the poses are updated in place. Returns the cost before and after.
-    pub fn solve(&mut self, config: &PoseGraphConfig) -> (f64, f64) {
-        let initial = cost(&self.poses, &self.edges);
+    /// Minimises the squared errors of all edges by Levenberg-Marquardt; the poses are updated in place. Unless the scale may drift, all
+    /// scales must be 1 and remain so. Returns the cost before and after.
+    pub fn solve(&mut self, config: &PoseGraphConfig, scale_drifts: bool) -> (f64, f64) {
+        if scale_drifts { self.solve_for::<SCALED>(config) } else { self.solve_for::<RIGID>(config) }
+    }
+
+    fn solve_for<const D: usize>(&mut self, config: &PoseGraphConfig) -> (f64, f64) {
+        let initial = cost::<D>(&self.poses, &self.edges);
         let mut current = initial;
         let mut lambda = config.initial_damping;
         for _ in 0..config.iterations {
-            let Some(candidate) = self.step(lambda) else {
+            let Some(candidate) = self.step::<D>(lambda) else {
                 lambda *= 10.0;
                 continue;
             };
-            let new = cost(&candidate, &self.edges);
+            let new = cost::<D>(&candidate, &self.edges);
             // A comparison with NaN is false: a step into nonsense is never taken.
             if new <= current {
                 let gain = current - new;
@@ -59,64 +70,84 @@ impl PoseGraph {
         (initial, current)
     }
 
-    /// The poses after one damped Gauss-Newton step; `None` if the equations cannot be solved.
-    fn step(&self, lambda: f64) -> Option<Vec<Pose>> {
+    /// The poses after one damped Gauss-Newton step in the first `D` parameters of each; `None` if the equations cannot be solved.
+    fn step<const D: usize>(&self, lambda: f64) -> Option<Vec<Similarity>> {
         let n = self.poses.len().checked_sub(1).filter(|n| *n > 0)?;
-        let mut diagonal = vec![Matrix6::zeros(); n];
-        let mut rhs = DMatrix::zeros(6 * n, 1);
-        let mut system = CooMatrix::new(6 * n, 6 * n);
+        let mut diagonal = vec![SMatrix::<f64, D, D>::zeros(); n];
+        let mut rhs = DMatrix::zeros(D * n, 1);
+        let mut system = CooMatrix::new(D * n, D * n);
         for edge in &self.edges {
-            let e = error(&self.poses, edge);
-            let half = 0.5 * adjoint_algebra(&e);
-            let j_a = (Matrix6::identity() - half) * adjoint(&edge.t_a_b.inverse());
-            let j_b = -(Matrix6::identity() + half);
+            let e = residual(&self.poses, edge);
+            let (left, right) = derivatives(&e);
+            let j_a = free::<D>(&left) * free::<D>(&sim3_adjoint(&edge.s_a_b.inverse()));
+            let j_b = -free::<D>(&right);
+            let e = tangent::<D>(&e);
             for (pose, jacobian) in [(edge.a, j_a), (edge.b, j_b)] {
                 if let Some(k) = pose.checked_sub(1) {
                     diagonal[k] += jacobian.transpose() * jacobian;
-                    let mut rows = rhs.fixed_view_mut::<6, 1>(6 * k, 0);
+                    let mut rows = rhs.fixed_view_mut::<D, 1>(D * k, 0);
                     rows -= jacobian.transpose() * e;
                 }
             }
             if let (Some(a), Some(b)) = (edge.a.checked_sub(1), edge.b.checked_sub(1)) {
                 let block = j_a.transpose() * j_b;
-                system.push_matrix(6 * a, 6 * b, &block);
-                system.push_matrix(6 * b, 6 * a, &block.transpose());
+                system.push_matrix(D * a, D * b, &block);
+                system.push_matrix(D * b, D * a, &block.transpose());
             }
         }
         for (k, block) in diagonal.iter_mut().enumerate() {
-            for i in 0..6 {
+            for i in 0..D {
                 block[(i, i)] += lambda * block[(i, i)] + 1e-9;
             }
-            system.push_matrix(6 * k, 6 * k, block);
+            system.push_matrix(D * k, D * k, block);
         }
         let factor = CscCholesky::factor(&CscMatrix::from(&system)).ok()?;
         let solution = factor.solve(&rhs);
-        let moved = self.poses[1..].iter().enumerate();
-        let moved = moved.map(|(k, pose)| perturbed(&solution.fixed_view::<6, 1>(6 * k, 0).into(), pose));
+        let moved = self.poses[1..].iter().enumerate().map(|(k, pose)| {
+            let mut xi = Tangent::zeros();
+            xi.fixed_rows_mut::<D>(0).copy_from(&solution.fixed_view::<D, 1>(D * k, 0));
+            sim3_perturbed(&xi, pose)
+        });
         Some(std::iter::once(self.poses[0]).chain(moved).collect())
     }
 }
 
-/// What is left of a measured motion when that of the poses is taken off it, as a tangent vector.
-fn error(poses: &[Pose], edge: &Edge) -> Vector6<f64> {
-    se3_log(&(edge.t_a_b.inverse() * poses[edge.a] * poses[edge.b].inverse()))
+/// What is left of a measured motion when that of the poses is taken off it.
+fn residual(poses: &[Similarity], edge: &Edge) -> Similarity {
+    edge.s_a_b.inverse() * poses[edge.a] * poses[edge.b].inverse()
 }
 
-fn cost(poses: &[Pose], edges: &[Edge]) -> f64 {
-    edges.iter().map(|edge| error(poses, edge).norm_squared()).sum()
+fn cost<const D: usize>(poses: &[Similarity], edges: &[Edge]) -> f64 {
+    edges.iter().map(|edge| tangent::<D>(&residual(poses, edge)).norm_squared()).sum()
 }
 
-/// The adjoint of a motion: `exp(Ad(T) ξ) = T exp(ξ) T⁻¹`.
-fn adjoint(pose: &Pose) -> Matrix6<f64> {
-    let rotation = *pose.rotation.to_rotation_matrix().matrix();
-    let mut ad = Matrix6::zeros();
-    ad.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-    ad.fixed_view_mut::<3, 3>(0, 3).copy_from(&(skew(&pose.translation.vector) * rotation));
-    ad.fixed_view_mut::<3, 3>(3, 3).copy_from(&rotation);
-    ad
+/// The first `D` coordinates of a similarity.
+fn tangent<const D: usize>(s: &Similarity) -> SVector<f64, D> {
+    sim3_tangent(s).fixed_rows::<D>(0).into_owned()
 }
 
-/// The adjoint of a tangent vector, the derivative of [`adjoint`].
+/// A map of the first `D` parameters to the first `D`.
+fn free<const D: usize>(map: &TangentMap) -> SMatrix<f64, D, D> {
+    map.fixed_view::<D, D>(0, 0).into_owned()
+}
+
+/// How the coordinates of `e` change when it is perturbed from the left, and from the right; exact for the scale, to first order of the
+/// rotation and translation of `e` for those.
+fn derivatives(e: &Similarity) -> (TangentMap, TangentMap) {
+    let half = 0.5 * adjoint_algebra(&tangent::<RIGID>(e));
+    let (mut left, mut right) = (TangentMap::identity(), TangentMap::identity());
+    let rigid_left = Matrix6::identity() - half;
+    left.fixed_view_mut::<6, 6>(0, 0).copy_from(&rigid_left);
+    // A scale from the left stretches the translation as well.
+    let stretch = rigid_left.fixed_columns::<3>(0) * e.isometry.translation.vector;
+    left.fixed_view_mut::<6, 1>(0, 6).copy_from(&stretch);
+    right.fixed_view_mut::<6, 6>(0, 0).copy_from(&(Matrix6::identity() + half));
+    // A translation from the right is stretched.
+    right.fixed_columns_mut::<3>(0).scale_mut(e.scaling());
+    (left, right)
+}
+
+/// The adjoint of a tangent vector of SE(3), the derivative of that of a motion.
 fn adjoint_algebra(xi: &Vector6<f64>) -> Matrix6<f64> {
     let rho = skew(&Vector3::new(xi[0], xi[1], xi[2]));
     let phi = skew(&Vector3::new(xi[3], xi[4], xi[5]));
@@ -130,55 +161,84 @@ fn adjoint_algebra(xi: &Vector6<f64>) -> Matrix6<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::se3_exp;
+    use crate::geometry::{Pose, se3_exp, sim3_from_tangent, unscaled};
 
     /// A walk around a square of four metres, twelve poses a side, looking ahead; and what an odometer with a bias makes of it.
-    fn walk() -> (Vec<Pose>, PoseGraph) {
+    fn walk(bias: &Similarity) -> (Vec<Similarity>, PoseGraph) {
         let step = Pose::translation(0.0, 0.0, -4.0 / 12.0);
         let turn = se3_exp(&Vector6::new(0.0, 0.0, 0.0, 0.0, std::f64::consts::FRAC_PI_2, 0.0));
-        let bias = se3_exp(&Vector6::new(0.004, 0.001, 0.002, 0.001, 0.004, -0.002));
-        let (mut truth, mut graph) = (vec![Pose::identity()], PoseGraph::default());
-        graph.poses.push(Pose::identity());
+        let (mut truth, mut graph) = (vec![Similarity::identity()], PoseGraph::default());
+        graph.poses.push(Similarity::identity());
         for i in 1..48 {
-            let motion = if i % 12 == 0 { turn * step } else { step };
+            let motion = unscaled(&if i % 12 == 0 { turn * step } else { step });
             truth.push(motion * truth[i - 1]);
             graph.poses.push(bias * motion * graph.poses[i - 1]);
-            graph.edges.push(Edge { a: i, b: i - 1, t_a_b: bias * motion });
+            graph.edges.push(Edge { a: i, b: i - 1, s_a_b: bias * motion });
         }
         (truth, graph)
     }
 
-    fn farthest(truth: &[Pose], poses: &[Pose]) -> f64 {
-        let center = |pose: &Pose| pose.inverse().translation.vector;
+    /// A bias of the motion, and one that makes each length a little longer than the last in the unit of the camera.
+    fn biases() -> [(Similarity, bool); 2] {
+        let rigid = se3_exp(&Vector6::new(0.004, 0.001, 0.002, 0.001, 0.004, -0.002));
+        let scale = Similarity::from_scaling(1.01);
+        [(unscaled(&rigid), false), (scale * rigid, true)]
+    }
+
+    fn farthest(truth: &[Similarity], poses: &[Similarity]) -> f64 {
+        let center = |pose: &Similarity| pose.inverse().isometry.translation.vector;
         truth.iter().zip(poses).map(|(t, p)| (center(t) - center(p)).norm()).fold(0.0, f64::max)
     }
 
     #[test]
     fn closing_a_loop_takes_most_of_the_drift_away() {
-        let (truth, mut graph) = walk();
-        let drift = farthest(&truth, &graph.poses);
-        graph.edges.push(Edge { a: 47, b: 0, t_a_b: truth[47] * truth[0].inverse() });
-        let (before, after) = graph.solve(&PoseGraphConfig::default());
-        assert!(after < 0.1 * before, "{before} {after}");
-        let left = farthest(&truth, &graph.poses);
-        assert!(drift > 0.5 && left < 0.2 * drift, "{drift} m before, {left} m after");
+        for (bias, scale_drifts) in biases() {
+            let (truth, mut graph) = walk(&bias);
+            let drift = farthest(&truth, &graph.poses);
+            graph.edges.push(Edge { a: 47, b: 0, s_a_b: truth[47] * truth[0].inverse() });
+            let (before, after) = graph.solve(&PoseGraphConfig::default(), scale_drifts);
+            assert!(after < 0.1 * before, "{before} {after}");
+            let left = farthest(&truth, &graph.poses);
+            assert!(drift > 0.5 && left < 0.2 * drift, "{drift} m before, {left} m after");
+            if !scale_drifts {
+                assert!(graph.poses.iter().all(|pose| pose.scaling() == 1.0));
+            }
+        }
     }
 
     #[test]
     fn edges_without_contradiction_are_met_exactly_from_a_far_start() {
-        let (truth, mut graph) = walk();
-        for edge in &mut graph.edges {
-            edge.t_a_b = truth[edge.a] * truth[edge.b].inverse();
+        for (bias, scale_drifts) in biases() {
+            let (truth, mut graph) = walk(&bias);
+            for edge in &mut graph.edges {
+                edge.s_a_b = truth[edge.a] * truth[edge.b].inverse();
+            }
+            graph.edges.push(Edge { a: 47, b: 0, s_a_b: truth[47] * truth[0].inverse() });
+            let (_, after) = graph.solve(&PoseGraphConfig { iterations: 50, ..Default::default() }, scale_drifts);
+            assert!(after < 1e-16 && farthest(&truth, &graph.poses) < 1e-7, "{after}");
         }
-        graph.edges.push(Edge { a: 47, b: 0, t_a_b: truth[47] * truth[0].inverse() });
-        let (_, after) = graph.solve(&PoseGraphConfig { iterations: 50, ..Default::default() });
-        assert!(after < 1e-16 && farthest(&truth, &graph.poses) < 1e-7, "{after}");
+    }
+
+    #[test]
+    fn derivatives_match_central_differences() {
+        let e = sim3_from_tangent(&Tangent::from([0.02, -0.01, 0.03, 0.01, 0.02, -0.015, 0.4]));
+        let (left, right) = derivatives(&e);
+        for axis in 0..SCALED {
+            let mut xi = Tangent::zeros();
+            xi[axis] = 1e-5;
+            let numeric = |f: &dyn Fn(&Tangent) -> Similarity| (sim3_tangent(&f(&xi)) - sim3_tangent(&f(&-xi))) / 2e-5;
+            let by_left = numeric(&|xi| sim3_from_tangent(xi) * e);
+            let by_right = numeric(&|xi| e * sim3_from_tangent(xi));
+            // What the first order leaves out is of the square of the motion: 1e-3 of a turn of 0.03.
+            assert!((by_left - left.column(axis)).norm() < 1e-3, "axis {axis}: {by_left}");
+            assert!((by_right - right.column(axis)).norm() < 1e-3, "axis {axis}: {by_right}");
+        }
     }
 
     #[test]
     fn a_graph_of_one_pose_stays_as_it_is() {
-        let mut graph = PoseGraph { poses: vec![Pose::identity()], edges: Vec::new() };
-        assert_eq!(graph.solve(&PoseGraphConfig::default()), (0.0, 0.0));
-        assert_eq!(graph.poses, [Pose::identity()]);
+        let mut graph = PoseGraph { poses: vec![Similarity::identity()], edges: Vec::new() };
+        assert_eq!(graph.solve(&PoseGraphConfig::default(), false), (0.0, 0.0));
+        assert_eq!(graph.poses, [Similarity::identity()]);
     }
 }

@@ -412,7 +412,7 @@ impl Slam {
         let c = &self.config.places;
         let last = self.anchors.last()?;
         let lost_s = self.tracker.current.timestamp_ns.saturating_sub(last.timestamp_ns) as f64 * 1e-9;
-        let t_cam_world = last.t_cam_reference * self.owner.map().keyframe_pose(last.reference)?;
+        let t_cam_world = self.owner.map().tied_pose(last.reference, &last.t_cam_reference)?;
         let center_world = t_cam_world.inverse_transform_point(&Point3::origin());
         // The longer it is lost, the less its last place says, until it says nothing.
         let forgotten = lost_s / c.max_reach_s;

@@ -35,7 +35,7 @@ impl Slam {
         // Most frames hang on the keyframe that the one before hangs on.
         let mut last: Option<(KeyFrameId, usize)> = None;
         for a in &self.anchors {
-            let Some(t_reference_world) = map.keyframe_pose(a.reference) else { continue };
+            let Some(t_cam_world) = map.tied_pose(a.reference, &a.t_cam_reference) else { continue };
             let at = match last.filter(|(reference, _)| *reference == a.reference) {
                 Some((_, at)) => at,
                 None => {
@@ -48,7 +48,7 @@ impl Slam {
                 }
             };
             last = Some((a.reference, at));
-            of_submaps[at].1.push((a.timestamp_ns, (a.t_cam_reference * t_reference_world).inverse()));
+            of_submaps[at].1.push((a.timestamp_ns, t_cam_world.inverse()));
         }
         of_submaps.into_iter().map(|(_, poses)| poses).collect()
     }

@@ -29,7 +29,7 @@ pub struct TrackedFrame {
     pub sights: Vec<Option<Sight>>,
     /// Maps world points into this camera.
     pub t_cam_world: Pose,
-    /// The keyframe it is tied to, and its pose seen from there, `t_cam_reference`.
+    /// The keyframe it is tied to, and its pose seen from there, `t_cam_reference` ([`Map::tie`]).
     pub reference: Option<(KeyFrameId, Pose)>,
     observations: Vec<PoseObservation>,
     observed: Vec<u32>,
@@ -116,9 +116,9 @@ impl TrackedFrame {
     /// Brings pose and matched points up to date after the map moved; matches to landmarks that are gone are dropped.
     pub fn follow_map(&mut self, map: &Map) {
         if let Some((reference, t_cam_reference)) = self.reference
-            && let Some(t_reference_world) = map.keyframe_pose(reference)
+            && let Some(t_cam_world) = map.tied_pose(reference, &t_cam_reference)
         {
-            self.t_cam_world = t_cam_reference * t_reference_world;
+            self.t_cam_world = t_cam_world;
         }
         for sight in &mut self.sights {
             if let Some(Sight { landmark: Some(id), .. }) = *sight {
@@ -129,8 +129,6 @@ impl TrackedFrame {
 
     /// Ties the frame to a keyframe, so that it moves along when the map is corrected.
     pub fn tie_to(&mut self, reference: KeyFrameId, map: &Map) {
-        self.reference = map
-            .keyframe_pose(reference)
-            .map(|t_reference_world| (reference, self.t_cam_world * t_reference_world.inverse()));
+        self.reference = map.tie(reference, &self.t_cam_world).map(|t_cam_reference| (reference, t_cam_reference));
     }
 }

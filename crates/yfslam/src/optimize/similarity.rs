@@ -1,0 +1,215 @@
+//! The similarity between two maps of the same points, from what their cameras saw (ORB-SLAM, IEEE T-RO 2015, section VII-B): each point
+//! of one map must be where a camera of the other one saw it, both ways.
+//!
+//! In: a first similarity, points of both maps and their measurements. Out: the similarity, and which pairs of points fit it.
+
+use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
+
+use crate::config::PoseOptimizerConfig;
+use crate::geometry::{Pinhole, Pose, Similarity, Tangent, TangentMap, sim3_perturbed, skew};
+use crate::optimize::residual::{Measurement, huber, projection_jacobian};
+
+/// Limit of χ² with two degrees of freedom up to which a point fits: its 99 % quantile. Source: ORB-SLAM2.
+const CHI2_LIMIT: f64 = 9.210;
+/// Least depth of a point that a camera can see.
+const MIN_DEPTH: f64 = 1e-3;
+
+/// A point as two maps have it, a and b, each in its own unit of length.
+#[derive(Clone, Copy, Debug)]
+pub struct Correspondence {
+    /// The point of a, in a camera that belongs to a.
+    pub in_a: Point3<f64>,
+    /// What that camera saw of it.
+    pub seen_in_a: Measurement,
+    /// The point of b, in the frame that is to be aligned with the camera of a.
+    pub in_b: Point3<f64>,
+    /// From there into a camera that belongs to b.
+    pub t_view_b: Pose,
+    /// What that camera saw of it.
+    pub seen_in_b: Measurement,
+    /// Set by the optimiser: whether the pair fits the similarity.
+    pub inlier: bool,
+}
+
+impl Correspondence {
+    /// Whether each point, brought over by `s_b_a`, is where the other map's camera saw it.
+    pub fn fits(&self, camera: &Pinhole, s_b_a: &Similarity) -> bool {
+        self.views(s_b_a, &s_b_a.inverse()).iter().all(|view| {
+            let m = &view.measurement;
+            view.point.z > MIN_DEPTH && m.chi2(&m.residual(camera, &view.point)) <= CHI2_LIMIT
+        })
+    }
+
+    /// The point of a in the camera of b, and the reverse; with the derivative by a left perturbation of `s_b_a`.
+    fn views(&self, s_b_a: &Similarity, s_a_b: &Similarity) -> [View; 2] {
+        let moved = s_b_a * self.in_a;
+        let rotation = |pose: &Pose| *pose.rotation.to_rotation_matrix().matrix();
+        let forth = rotation(&self.t_view_b) * by_perturbation(&moved.coords);
+        // What is perturbed from the left is undone by the opposite from the right.
+        let back = -(rotation(&s_a_b.isometry) * s_a_b.scaling()) * by_perturbation(&self.in_b.coords);
+        [
+            View { point: (self.t_view_b * moved).coords, jacobian: forth, measurement: self.seen_in_b },
+            View { point: (s_a_b * self.in_b).coords, jacobian: back, measurement: self.seen_in_a },
+        ]
+    }
+}
+
+/// A point in a camera.
+struct View {
+    point: Vector3<f64>,
+    jacobian: SMatrix<f64, 3, 7>,
+    measurement: Measurement,
+}
+
+/// How a point moves when it is perturbed: ρ + φ × p + σ p.
+fn by_perturbation(p: &Vector3<f64>) -> SMatrix<f64, 3, 7> {
+    let mut jacobian = SMatrix::<f64, 3, 7>::zeros();
+    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
+    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(p));
+    jacobian.set_column(6, p);
+    jacobian
+}
+
+/// Refines `s_b_a` in place and marks the inliers; returns their number. Rounds are those of [`super::pose_only::optimize_pose`].
+pub fn optimize_similarity(
+    camera: &Pinhole,
+    config: &PoseOptimizerConfig,
+    s_b_a: &mut Similarity,
+    correspondences: &mut [Correspondence],
+) -> usize {
+    let mut inliers = 0;
+    for round in 0..config.rounds {
+        inliers = 0;
+        for c in correspondences.iter_mut() {
+            c.inlier = c.fits(camera, s_b_a);
+            inliers += usize::from(c.inlier);
+        }
+        if inliers < 3 {
+            return inliers;
+        }
+        minimise(camera, config, round < config.robust_rounds, s_b_a, correspondences);
+    }
+    inliers
+}
+
+/// Levenberg-Marquardt over the seven parameters of a left perturbation.
+fn minimise(
+    camera: &Pinhole,
+    config: &PoseOptimizerConfig,
+    robust: bool,
+    s_b_a: &mut Similarity,
+    correspondences: &[Correspondence],
+) {
+    let mut lambda = config.initial_damping;
+    let (mut h, mut b, mut cost) = linearise(camera, robust, s_b_a, correspondences);
+    for _ in 0..config.iterations {
+        let mut damped = h;
+        for i in 0..7 {
+            damped[(i, i)] += lambda * h[(i, i)].max(1e-9);
+        }
+        let Some(step) = damped.cholesky().map(|c| c.solve(&b)) else { return };
+        let candidate = sim3_perturbed(&step, s_b_a);
+        let (h_new, b_new, cost_new) = linearise(camera, robust, &candidate, correspondences);
+        // A comparison with NaN is false: a step into nonsense is never taken.
+        if cost_new <= cost {
+            let gain = cost - cost_new;
+            *s_b_a = candidate;
+            (h, b, cost) = (h_new, b_new, cost_new);
+            lambda *= 0.2;
+            if gain < config.relative_tolerance * cost {
+                return;
+            }
+        } else {
+            lambda *= 10.0;
+        }
+    }
+}
+
+/// Normal equations H, b and the robust cost, over the inliers.
+fn linearise(
+    camera: &Pinhole,
+    robust: bool,
+    s_b_a: &Similarity,
+    correspondences: &[Correspondence],
+) -> (TangentMap, Tangent, f64) {
+    let (mut h, mut b, mut cost) = (TangentMap::zeros(), Tangent::zeros(), 0.0);
+    let s_a_b = s_b_a.inverse();
+    for view in correspondences.iter().filter(|c| c.inlier).flat_map(|c| c.views(s_b_a, &s_a_b)) {
+        if view.point.z <= MIN_DEPTH {
+            cost += CHI2_LIMIT;
+            continue;
+        }
+        let r = view.measurement.residual(camera, &view.point);
+        let chi2 = view.measurement.chi2(&r);
+        let (loss, weight) = if robust { huber(chi2, CHI2_LIMIT) } else { (chi2, 1.0) };
+        cost += loss;
+        let j = projection_jacobian(camera, &view.point) * view.jacobian;
+        let weighted = Matrix3::from_diagonal(&(view.measurement.information() * weight)) * j;
+        h += j.transpose() * weighted;
+        b += weighted.transpose() * r;
+    }
+    (h, b, cost)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{se3_exp, sim3_from_tangent, sim3_tangent};
+    use nalgebra::Vector6;
+    use proptest::prelude::*;
+
+    const CAMERA: Pinhole = Pinhole { fx: 520.0, fy: 510.0, cx: 320.0, cy: 240.0, bf: 0.0 };
+
+    fn measured(p: &Point3<f64>) -> Measurement {
+        let [u, v] = CAMERA.project(&p.coords);
+        Measurement { u, v, weight_px: 1.0, ..Default::default() }
+    }
+
+    /// Points of a, as b has them by `s_b_a`; every eighth of b is somewhere else.
+    fn pairs(s_b_a: &Similarity) -> Vec<Correspondence> {
+        let t_view_b = se3_exp(&Vector6::new(0.2, -0.1, 0.05, 0.02, -0.03, 0.01));
+        let pair = |i: usize| {
+            let in_a =
+                Point3::new(0.2 * (i % 7) as f64 - 0.6, 0.15 * (i % 5) as f64 - 0.3, 2.0 + 0.3 * ((i * 5) % 9) as f64);
+            let elsewhere = if i.is_multiple_of(8) { Vector3::new(0.9, -0.7, 0.4) } else { Vector3::zeros() };
+            let in_b = s_b_a * in_a + elsewhere;
+            let seen_in_b = measured(&(t_view_b * in_b));
+            Correspondence { in_a, seen_in_a: measured(&in_a), in_b, t_view_b, seen_in_b, inlier: false }
+        };
+        (0..40).map(pair).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn a_similarity_is_found_from_nearby_and_wrong_pairs_are_told(
+            v in prop::array::uniform6(-0.1f64..0.1), sigma in -1.0f64..1.0, w in prop::array::uniform7(-0.002f64..0.002),
+        ) {
+            let truth = sim3_from_tangent(&Vector6::from_row_slice(&v).push(sigma));
+            let mut pairs = pairs(&truth);
+            let mut found = sim3_perturbed(&Tangent::from_row_slice(&w), &truth);
+            let inliers = optimize_similarity(&CAMERA, &PoseOptimizerConfig::default(), &mut found, &mut pairs);
+            prop_assert_eq!(inliers, 35);
+            prop_assert!(pairs.iter().enumerate().all(|(i, pair)| pair.inlier != i.is_multiple_of(8)));
+            prop_assert!(sim3_tangent(&(found * truth.inverse())).norm() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn derivatives_match_central_differences() {
+        let s = sim3_from_tangent(&Tangent::from([0.1, -0.05, 0.2, 0.03, 0.02, -0.04, 0.5]));
+        let pair = pairs(&s)[3];
+        for axis in 0..7 {
+            let mut xi = Tangent::zeros();
+            xi[axis] = 1e-6;
+            let at = |xi: &Tangent| {
+                let moved = sim3_perturbed(xi, &s);
+                pair.views(&moved, &moved.inverse()).map(|view| view.point)
+            };
+            let (plus, minus, views) = (at(&xi), at(&-xi), pair.views(&s, &s.inverse()));
+            for side in 0..2 {
+                let numeric = (plus[side] - minus[side]) / 2e-6;
+                assert!((numeric - views[side].jacobian.column(axis)).norm() < 1e-6, "axis {axis}, side {side}");
+            }
+        }
+    }
+}
