@@ -49,8 +49,7 @@ config_section! {
         /// Distance between two keyframes, as a share of the median depth in the older one, below which nothing is triangulated between
         /// them. Source: ORB-SLAM.
         min_baseline_share: f64 = 0.01,
-        /// Stands in the place of `tracking.reset_after_s` for a map of at most `tracking.reset_max_keyframes`, s. A larger one is never
-        /// left: a new one would have another scale.
+        /// Stands in the place of `tracking.reset_after_s` for a submap of at most `tracking.reset_max_keyframes`, s.
         reset_after_s: f64 = 0.5,
         /// Landmarks of a keyframe and of an old place that must agree on the similarity between them. Source: ORB-SLAM2.
         loop_min_pairs: usize = 20,
@@ -68,7 +67,6 @@ impl Config {
             self.keyframes.min_observation_weight = m.reference_observation_weight;
             self.keyframes.min_frames = m.min_frames;
             self.tracking.local_radius_factor = m.local_radius_factor;
-            self.tracking.reset_after_s = m.reset_after_s;
             self.mapping.triangulation_neighbours = m.triangulation_neighbours;
             self.mapping.min_observation_weight = m.min_observation_weight;
         }

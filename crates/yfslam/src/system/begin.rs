@@ -33,13 +33,19 @@ impl Slam {
         if self.map_use == Some(MapUse::Localise) {
             return false;
         }
-        // A second submap of a camera without depth would have a scale of its own, and could not be joined with this one.
-        let map = self.owner.map();
-        if !self.sensor.measures_depth && map.keyframe_count() > self.config.tracking.reset_max_keyframes {
-            return false;
-        }
         self.unknown_frames += usize::from(self.has_enough_to_start());
-        self.unknown_frames as f64 > self.config.tracking.reset_after_s * self.sensor.camera.fps
+        let begins = !self.sensor.measures_depth && self.is_young();
+        let after_s = if begins { self.config.monocular.reset_after_s } else { self.config.tracking.reset_after_s };
+        self.unknown_frames as f64 > after_s * self.sensor.camera.fps
+    }
+
+    /// Whether the submap that the camera is in has only just begun, or is yet to begin.
+    pub(super) fn is_young(&self) -> bool {
+        let young = self.config.tracking.reset_max_keyframes;
+        match self.tracker.reference() {
+            Some(reference) => self.owner.map().submap_size(reference, young + 1) <= young,
+            None => self.state == TrackingState::NotInitialized,
+        }
     }
 
     /// Begins a submap with the next frame, in a world that continues where the camera was lost. The old one stays, to be recognised

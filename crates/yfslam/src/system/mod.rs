@@ -236,10 +236,17 @@ impl Slam {
             self.tracker.gained_keyframe(inserted.keyframe);
             loop_closed = times.note(&inserted);
         }
+        let mut made_map = false;
         let tracked = match self.state {
             TrackingState::NotInitialized if !self.sensor.measures_depth => {
-                let begun = self.begin_from_two_views(frame);
-                begun.is_some_and(|begun| times.note(&begun).is_none())
+                // Beside another submap it may come back to that one first.
+                let found = self.find_again();
+                times.places += clock.lap();
+                if !found {
+                    let begun = self.begin_from_two_views(frame);
+                    made_map = begun.is_some_and(|begun| times.note(&begun).is_none());
+                }
+                found || made_map
             }
             TrackingState::NotInitialized => self.owner.is_free() && self.has_enough_to_start(),
             TrackingState::Tracking => {
@@ -254,9 +261,7 @@ impl Slam {
             TrackingState::Lost => {
                 let found = self.find_again();
                 times.places += clock.lap();
-                // Whoever was lost has to be surer than whoever was not.
-                let min_inliers = self.config.places.relocalise_min_inliers;
-                found && self.tracker.track_local_map(&self.sensor, &self.config, self.owner.map(), min_inliers)
+                found
             }
         };
         self.owner.note(&mut self.tracker.sightings);
@@ -272,7 +277,6 @@ impl Slam {
             self.tracker.reject();
         }
         times.tracking = clock.lap();
-        let made_map = tracked && self.state == TrackingState::NotInitialized && !self.sensor.measures_depth;
         let is_keyframe = made_map || tracked && self.wants_keyframe();
         if is_keyframe && !made_map {
             self.tracker.offered_keyframe();
@@ -393,18 +397,20 @@ impl Slam {
         let last = &self.tracker.current.features.features;
         let trusted = last.iter().filter(|f| f.trust > 0.0).count().max(1);
         let factor = (last.len() as f64 / trusted as f64).clamp(1.0, self.config.dynamic.max_extra_features);
-        let young = self.owner.map().keyframe_count() <= self.config.tracking.reset_max_keyframes;
-        let begins = young && !self.sensor.measures_depth;
+        let begins = !self.sensor.measures_depth && self.is_young();
         (count * factor * if begins { self.config.monocular.start_features } else { 1.0 }) as usize
     }
 
-    /// Seeks the frame of a camera that was lost in the whole map.
+    /// Seeks the frame of a camera that was lost in the whole map, and tracks it there.
     fn find_again(&mut self) -> bool {
         let reach = self.reach();
         let recogniser = self.owner.recogniser();
         let mut recogniser = recogniser.lock().unwrap_or_else(PoisonError::into_inner);
         let map = self.owner.map();
+        // Whoever was lost has to be surer than whoever was not.
+        let min_inliers = self.config.places.relocalise_min_inliers;
         relocalise(&mut recogniser, &self.sensor, &self.config, map, &mut self.tracker.current, reach.as_ref())
+            && self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers)
     }
 
     /// Where the camera can have come since it was lost; `None` after too long a time, or if it never was tracked.
