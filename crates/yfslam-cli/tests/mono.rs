@@ -4,14 +4,16 @@
 mod common;
 
 use std::fs;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use common::{ate_rmse, fails, report, succeeds};
 use nalgebra::{Rotation3, Vector3};
 use yfslam::config::DepthSource;
 use yfslam::dynamic::Method;
 use yfslam::image::RgbImage;
+use yfslam::loops::LoopClosed;
 use yfslam::{Camera, Config, RgbdFrame, Slam};
+use yfslam_eval::{AlignmentKind, Match, StampedPose, ate};
 use yfslam_synth::World;
 
 /// A desk, seen while the camera moves along its axes, and the same walk through people.
@@ -90,4 +92,69 @@ fn a_single_camera_that_only_turns_begins_no_map() {
         assert!(slam.track(&frame).unwrap().t_world_cam.is_none(), "frame {k}");
     }
     assert_eq!(slam.map().keyframe_count(), 0);
+}
+
+/// Once around an office and a little on.
+const ROUND: &str = "walking_xyz?scene=office&motion=loop&people=0&frames=500&fps=12&width=320&height=240";
+
+/// What became of a way around the office.
+struct Round {
+    loops: Vec<LoopClosed>,
+    /// Parts of the way that are in maps apart.
+    parts: usize,
+    /// Frames with a pose in the largest map, and their error after alignment by a similarity, m.
+    tracked: usize,
+    ate_m: f64,
+}
+
+/// The same frames with loops, without, and with loops where the camera is carried on in the dark for six seconds.
+fn rounds() -> &'static [Round; 3] {
+    // Rendered once for all tests.
+    static ROUNDS: OnceLock<[Round; 3]> = OnceLock::new();
+    ROUNDS.get_or_init(|| {
+        let world = World::new(&yfslam_synth::parse(ROUND).unwrap()).unwrap();
+        let begin = |with_loops: bool| {
+            let mut config = Config::default();
+            (config.depth.source, config.dynamic.method) = (DepthSource::Motion, Method::None);
+            config.loops.enabled = with_loops;
+            (Slam::new(config, &world.config().camera, None).unwrap(), Vec::new())
+        };
+        let mut runs = [begin(true), begin(false), begin(true)];
+        for index in 0..world.len() {
+            let frame = world.frame(index).frame;
+            let carried = (108..180).contains(&index);
+            for (slam, loops) in &mut runs[..if carried { 2 } else { 3 }] {
+                loops.extend(slam.track(&frame).unwrap().loop_closed);
+            }
+        }
+        let truth = |timestamp_ns| (0..world.len()).find(|i| world.timestamp_ns(*i) == timestamp_ns).unwrap();
+        runs.map(|(slam, loops)| {
+            let pair = |(timestamp_ns, pose)| Match {
+                reference: StampedPose::new(timestamp_ns, world.pose(truth(timestamp_ns))),
+                estimate: StampedPose::new(timestamp_ns, pose),
+            };
+            let matches: Vec<Match> = slam.trajectory().into_iter().map(pair).collect();
+            let ate_m = ate(&matches, AlignmentKind::Sim3).unwrap().translation_m.rmse;
+            Round { loops, parts: slam.trajectories().len(), tracked: matches.len(), ate_m }
+        })
+    })
+}
+
+#[test]
+fn a_single_camera_that_comes_back_takes_the_drift_of_the_scale_away() {
+    let [closed, open, _] = rounds();
+    assert!(open.loops.is_empty() && closed.tracked == open.tracked && closed.tracked > 400, "{}", closed.tracked);
+    // Lengths have grown by a fifth on the way.
+    let drifts: Vec<f64> = closed.loops.iter().map(|l| l.drift.scaling()).collect();
+    assert!(drifts.len() == 1 && (drifts[0].ln() - 1.2f64.ln()).abs() < 0.1, "{drifts:?}");
+    assert!(closed.ate_m < 0.06 && closed.ate_m < 0.4 * open.ate_m, "{} m, {} m", closed.ate_m, open.ate_m);
+}
+
+#[test]
+fn a_single_camera_put_elsewhere_joins_two_maps_of_different_scale() {
+    let joined = &rounds()[2];
+    let merged: Vec<_> = joined.loops.iter().map(|l| (l.merged_submaps, l.drift.scaling())).collect();
+    assert!(merged.len() == 1 && merged[0].0, "{merged:?}");
+    assert!(joined.parts == 1 && joined.tracked > 250, "{} in {} parts", joined.tracked, joined.parts);
+    assert!(joined.ate_m < 0.2, "{} m, units of length differ by {}", joined.ate_m, merged[0].1);
 }
