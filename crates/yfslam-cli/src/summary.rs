@@ -7,7 +7,7 @@ use yfslam_eval::{AlignmentKind, Table, TableStyle, improvement_percent};
 
 use crate::boxes::BoxOrigin;
 use crate::lane::Judged;
-use crate::pipeline::PlaceTally;
+use crate::pipeline::{Loop, PlaceTally};
 use crate::report::{Report, Run};
 use crate::settings::describe;
 use crate::source::{Source, Truth};
@@ -63,8 +63,13 @@ pub fn of_one(report: &Report, run: &Run) -> Result<String> {
 
 fn places_summary(text: &mut String, places: &PlaceTally) -> Result<()> {
     let joins = places.loops.iter().filter(|l| l.merged_submaps).count();
-    let drifts: Vec<_> =
-        places.loops.iter().filter(|l| !l.merged_submaps).map(|l| format!("{:.2} m", l.drift_m)).collect();
+    // A single camera has a unit of its own, which drifts.
+    let drift = |l: &Loop| {
+        let scale =
+            if l.drift_scale == 1.0 { " m".to_owned() } else { format!(" and a scale of {:.2}", l.drift_scale) };
+        format!("{:.2}{scale}", l.drift_m)
+    };
+    let drifts: Vec<_> = places.loops.iter().filter(|l| !l.merged_submaps).map(drift).collect();
     if !drifts.is_empty() {
         writeln!(text, "loops closed: {}, after a drift of {}", drifts.len(), drifts.join(", "))?;
     }

@@ -21,7 +21,7 @@ use yfslam_io::write::PlyPoint;
 use crate::cpu;
 use crate::detector::Took;
 use crate::source::Skip;
-pub use places::PlaceTally;
+pub use places::{Loop, PlaceTally};
 pub use stages::{StageSummary, Stages};
 pub use tally::{DynamicTally, FrameTally};
 

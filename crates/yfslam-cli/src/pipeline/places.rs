@@ -29,6 +29,8 @@ pub struct Loop {
     pub drift_m: f64,
     /// Angle likewise, degrees.
     pub drift_deg: f64,
+    /// By how much the map around the camera was too large; 1 where depth is measured.
+    pub drift_scale: f64,
     /// Whether it joined two submaps: the drift is then the motion between their worlds.
     pub merged_submaps: bool,
 }
@@ -55,11 +57,12 @@ impl PlaceTally {
 
     /// Takes account of a loop.
     pub fn close(&mut self, timestamp_ns: i64, closed: &LoopClosed) {
-        let (drift_m, drift_deg) =
-            (closed.drift.isometry.translation.vector.norm(), closed.drift.isometry.rotation.angle().to_degrees());
+        let motion = closed.drift.isometry;
+        let (drift_m, drift_deg) = (motion.translation.vector.norm(), motion.rotation.angle().to_degrees());
+        let drift_scale = closed.drift.scaling();
         let LoopClosed { inliers, merged_submaps, .. } = *closed;
-        tracing::info!(inliers, drift_m, drift_deg, merged_submaps, "loop closed");
-        self.loops.push(Loop { timestamp_ns, inliers, drift_m, drift_deg, merged_submaps });
+        tracing::info!(inliers, drift_m, drift_deg, drift_scale, merged_submaps, "loop closed");
+        self.loops.push(Loop { timestamp_ns, inliers, drift_m, drift_deg, drift_scale, merged_submaps });
     }
 
     fn lost_or_found(&mut self, tracked: &Tracked) {

@@ -70,6 +70,10 @@ config_section! {
         max_drift_deg: f64 = 5.0,
         /// Drift for each metre of way, degrees.
         max_drift_deg_per_m: f64 = 1.0,
+        /// Drift of the scale that needs no way, as a share; without depth, when the four above are in the map's own unit.
+        max_drift_scale: f64 = 0.1,
+        /// Drift of the scale for each unit of way. Around an office of 10 m lengths grew or shrank by up to a fifth.
+        max_drift_scale_per_m: f64 = 0.03,
         /// Shared landmarks that make an edge of the pose graph. Source: ORB-SLAM.
         strong_weight: usize = 100,
     }

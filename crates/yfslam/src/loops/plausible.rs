@@ -1,7 +1,8 @@
 //! Whether the drift that a loop would take away can have come about on the way since.
 //!
 //! In: the two ends of a loop and the drift between them. Out: yes or no. The scale of an RGB-D map is measured, so its drift grows with
-//! the way and stays a small share of it; a place that merely looks the same is metres and right angles off.
+//! the way and stays a small share of it; a place that merely looks the same is metres and right angles off. Without depth the scale
+//! drifts, too.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -16,10 +17,12 @@ use crate::map::{KeyFrameId, Map};
 pub fn is_plausible(config: &LoopConfig, map: &Map, from: KeyFrameId, to: KeyFrameId, drift: &Similarity) -> bool {
     // Between two submaps there is no way, and nothing to be explained by it.
     let Some(way) = way_between(map, from, to) else { return false };
-    let drift = drift.isometry;
-    let (shift_m, turn_deg) = (drift.translation.vector.norm(), drift.rotation.angle().to_degrees());
+    let motion = drift.isometry;
+    let (shift_m, turn_deg) = (motion.translation.vector.norm(), motion.rotation.angle().to_degrees());
+    let scale = drift.scaling().ln().abs();
     shift_m <= config.max_drift_m + config.max_drift_m_per_m * way
         && turn_deg <= config.max_drift_deg + config.max_drift_deg_per_m * way
+        && scale <= (config.max_drift_scale + config.max_drift_scale_per_m * way).ln_1p()
 }
 
 /// The shortest way from one keyframe to another over keyframes that share landmarks: metres, to which each radian turned adds one.
@@ -98,6 +101,10 @@ mod tests {
         let turn = Pose::rotation(Vector3::new(0.0, 0.2, 0.0));
         assert!(explained(20, turn) && !explained(5, turn));
         assert!(!explained(20, Pose::rotation(Vector3::new(0.0, std::f64::consts::PI, 0.0))));
+        for scale in [1.4, 1.0 / 1.4] {
+            let explained = |end: usize| is_plausible(&c, &map, ids[0], ids[end], &Similarity::from_scaling(scale));
+            assert!(explained(20) && !explained(5));
+        }
     }
 
     #[test]
