@@ -65,3 +65,76 @@ fn correspondences(
     };
     k.sights().filter_map(pair).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::DepthSource;
+    use crate::geometry::{Pose, rigid, se3_exp, sim3_from_tangent, sim3_tangent, unscaled};
+    use crate::map::scene::{Scene, camera};
+    use crate::tracking::Sight;
+    use nalgebra::Vector6;
+
+    /// An old place, and a keyframe whose surroundings are the place's by `s_near_place`, located in the place by what both see.
+    fn apart(s_near_place: &Similarity) -> (SensorModel, Config, Map, KeyFrameId, Candidate, TrackedFrame) {
+        let mut config = Config::default();
+        // The scene has depths; all are beyond this range.
+        (config.depth.source, config.depth.max_m) = (DepthSource::Motion, 1.0);
+        let sensor = SensorModel::new(&camera(), &config, &[1.0]);
+        let (scene, mut map) = (Scene::new(), Map::default());
+        let (mut place, mut near) = (Vec::new(), Vec::new());
+        for k in 0..4 {
+            place.push(scene.add(&mut map, k, &scene.pose(k), &place));
+        }
+        for k in 2..5 {
+            near.push(scene.add(&mut map, k, &scene.pose(k), &near));
+        }
+        for id in map.landmarks_of(&near) {
+            let position = s_near_place * map.landmark(id).unwrap().position;
+            map.set_position(id, position);
+        }
+        for &id in &near {
+            let s_cam_near = unscaled(&map.keyframe(id).unwrap().t_cam_world) * s_near_place.inverse();
+            map.set_pose(id, rigid(&s_cam_near));
+        }
+        let mut located = TrackedFrame::default();
+        located.features.clone_from(&map.keyframe(near[1]).unwrap().features);
+        located.t_cam_world = scene.pose(3);
+        located.clear_sights();
+        for (_, landmark) in place.iter().flat_map(|id| map.keyframe(*id).unwrap().sights()) {
+            let l = map.landmark(landmark).unwrap();
+            if let Some(i) = located.features.descriptors.iter().position(|d| *d == l.descriptor) {
+                located.sights[i] = Some(Sight { landmark: Some(landmark), point_world: l.position });
+            }
+        }
+        let place = Candidate { keyframe: place[3], group: place, matches: Vec::new() };
+        (sensor, config, map, near[1], place, located)
+    }
+
+    #[test]
+    fn the_scale_between_two_maps_is_found_though_locating_was_a_little_off() {
+        let s_near_place = sim3_from_tangent(&[0.5, -0.3, 1.0, 0.2, -0.5, 0.1, 0.8].into());
+        let (sensor, config, map, keyframe, place, mut located) = apart(&s_near_place);
+        let truth = unscaled(&map.keyframe(keyframe).unwrap().t_cam_world) * s_near_place;
+        located.t_cam_world = se3_exp(&Vector6::new(0.004, -0.003, 0.005, 0.001, 0.001, -0.001)) * located.t_cam_world;
+        let found = measure(&sensor, &config, &map, keyframe, &place, &located).unwrap();
+        assert!(sim3_tangent(&(found * truth.inverse())).norm() < 1e-3, "{found} {truth}");
+    }
+
+    #[test]
+    fn landmarks_that_are_not_the_same_give_no_scale() {
+        let (sensor, config, mut map, keyframe, place, located) = apart(&Similarity::identity());
+        assert!(measure(&sensor, &config, &map, keyframe, &place, &located).is_some());
+        let near: Vec<LandmarkId> = map.keyframe(keyframe).unwrap().sights().map(|(_, id)| id).collect();
+        let positions: Vec<_> = near.iter().map(|id| map.landmark(*id).unwrap().position).collect();
+        for (id, position) in near.iter().zip(positions.iter().cycle().skip(7)) {
+            map.set_position(*id, *position);
+        }
+        assert!(measure(&sensor, &config, &map, keyframe, &place, &located).is_none());
+        // And where nothing is matched twice there is nothing to go by.
+        let mut unmatched = located;
+        unmatched.clear_sights();
+        unmatched.t_cam_world = Pose::identity();
+        assert!(measure(&sensor, &config, &map, keyframe, &place, &unmatched).is_none());
+    }
+}
