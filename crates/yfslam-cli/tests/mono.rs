@@ -144,7 +144,7 @@ fn rounds() -> &'static [Round; 3] {
 fn a_single_camera_that_comes_back_takes_the_drift_of_the_scale_away() {
     let [closed, open, _] = rounds();
     assert!(open.loops.is_empty() && closed.tracked == open.tracked && closed.tracked > 400, "{}", closed.tracked);
-    // Lengths have grown by a fifth on the way.
+    // The unit of length has grown by a fifth on the way.
     let drifts: Vec<f64> = closed.loops.iter().map(|l| l.drift.scaling()).collect();
     assert!(drifts.len() == 1 && (drifts[0].ln() - 1.2f64.ln()).abs() < 0.1, "{drifts:?}");
     assert!(closed.ate_m < 0.06 && closed.ate_m < 0.4 * open.ate_m, "{} m, {} m", closed.ate_m, open.ate_m);

@@ -14,8 +14,8 @@
 //! | module | what it knows |
 //! |---|---|
 //! | [`image`], [`features`] | one image: pyramid, FAST, ORB; [`features::FrameFeatures`] adds depth, undistortion and a search grid; depth from stereo |
-//! | [`geometry`], [`camera`], [`sensor`] | rigid motions, the lens, the noise of corners and depths |
-//! | [`optimize`] | least squares: one pose, or a window of poses and points |
+//! | [`geometry`], [`camera`], [`sensor`] | rigid motions, similarities, the lens, the noise of corners and depths |
+//! | [`optimize`] | least squares: one pose, a window of poses and points, motions between poses |
 //! | [`map`] | keyframes and landmarks, their invariants, the only code that changes them |
 //! | [`dynamic`] | how far a feature may be trusted to be static; nothing else knows that people exist |
 //! | [`tracking`] | the pose of each frame; when to make a keyframe |

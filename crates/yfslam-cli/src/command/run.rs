@@ -51,7 +51,7 @@ In the output folder:
   report.html     with --report, all of it on one page: figures, pictures, tables
 
 A single camera (--sensor mono) knows no lengths: the median depth of its first landmarks is 1, errors are those after alignment by Sim(3).
-It begins its map when it has moved aside, closes no loops, and when lost waits until it recognises a place.
+It begins its map when it has moved aside, and so it does again when lost where it recognises nothing. Loops correct its scale, too.
 
 Of several methods each has a folder of its own in the output folder, OUT/none and so on, and report.html compares them. Each frame is
 read or rendered once, and the network looks at it once; results are those of a run of each method alone. A method that fails leaves a

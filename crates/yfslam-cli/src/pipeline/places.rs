@@ -29,7 +29,7 @@ pub struct Loop {
     pub drift_m: f64,
     /// Angle likewise, degrees.
     pub drift_deg: f64,
-    /// By how much the map around the camera was too large; 1 where depth is measured.
+    /// The unit of length around the camera in that of the old place: 1 where depth is measured.
     pub drift_scale: f64,
     /// Whether it joined two submaps: the drift is then the motion between their worlds.
     pub merged_submaps: bool,

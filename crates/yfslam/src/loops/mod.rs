@@ -41,7 +41,7 @@ pub struct LoopClosed {
     /// Landmarks of the old place that fit.
     pub inliers: usize,
     /// How the keyframe's estimate differed from the old place's: `s_estimated_located`, in the camera's frame. Its scale is 1 where depth
-    /// is measured; else it is by how much the map around the keyframe was too large.
+    /// is measured; else it is the unit of length around the keyframe in that of the old place.
     pub drift: Similarity,
     /// The motion between the two, as measured.
     pub t_keyframe_to: Pose,
