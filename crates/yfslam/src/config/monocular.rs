@@ -6,7 +6,7 @@ use super::{Config, DepthSource, FieldDocs, config_section};
 
 config_section! {
     /// A single camera without depth (`--sensor mono`). Its unit of length is arbitrary: the median depth of the first landmarks is 1.
-    /// (ORB-SLAM, IEEE T-RO 2015, section IV for the start, V and VI for the rest.)
+    /// (ORB-SLAM, IEEE T-RO 2015, section IV for the start, V to VII for the rest.)
     MonocularConfig {
         /// Features asked for until the map has more than `tracking.reset_max_keyframes` keyframes, as a multiple of `features.count`: it
         /// begins with those of the finest level alone. ORB-SLAM has 2.
