@@ -15,9 +15,9 @@ LEAST_SIDE = 9.0  # px
 def angle(rng):
     """Camera roll, degrees: mostly upright, often up to 45, at times up to 100."""
     kind = rng.random()
-    if kind < 0.5:
+    if kind < 0.55:
         return rng.normal(0, 5)
-    return rng.uniform(-45, 45) if kind < 0.8 else rng.uniform(-100, 100)
+    return rng.uniform(-45, 45) if kind < 0.9 else rng.uniform(-100, 100)
 
 
 def matrix(rng, boxes, source, width, height, zoom, theta):

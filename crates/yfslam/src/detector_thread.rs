@@ -9,13 +9,15 @@ use std::thread::JoinHandle;
 
 use crate::detection::{Detection, Detector, DetectorError};
 use crate::image::RgbImage;
+use crate::upright::Upright;
 
+type Request = (Arc<RgbImage>, i32, Vec<Detection>);
 type Answer = (Result<(), DetectorError>, Vec<Detection>);
 
 /// Runs a [`Detector`] beside the calling thread.
 pub struct DetectorThread {
     /// `None` once the thread was told to end.
-    requests: Option<SyncSender<(Arc<RgbImage>, Vec<Detection>)>>,
+    requests: Option<SyncSender<Request>>,
     answers: Receiver<Answer>,
     thread: Option<JoinHandle<()>>,
     buffer: Vec<Detection>,
@@ -29,11 +31,12 @@ impl DetectorThread {
     /// # Errors
     /// If the operating system grants no thread.
     pub fn spawn(mut detector: Box<dyn Detector>) -> std::io::Result<Self> {
-        let (requests, inbox) = sync_channel::<(Arc<RgbImage>, Vec<Detection>)>(1);
+        let (requests, inbox) = sync_channel::<Request>(1);
         let (outbox, answers) = sync_channel(1);
         let thread = std::thread::Builder::new().name("detector".to_owned()).spawn(move || {
-            for (image, mut boxes) in inbox {
-                let result = detector.detect(&image, &mut boxes);
+            let mut upright = Upright::default();
+            for (image, roll_deg, mut boxes) in inbox {
+                let result = upright.detect(&mut *detector, &image, roll_deg, &mut boxes);
                 if outbox.send((result, boxes)).is_err() {
                     return;
                 }
@@ -42,11 +45,11 @@ impl DetectorThread {
         Ok(Self { requests: Some(requests), answers, thread: Some(thread), buffer: Vec::new(), busy: false })
     }
 
-    /// Hands over the image of this frame, unless the boxes of an earlier one were not taken yet.
-    pub fn start(&mut self, image: &Arc<RgbImage>) {
+    /// Hands over the image of this frame and the roll of its camera, degrees, unless the boxes of an earlier one were not taken yet.
+    pub fn start(&mut self, image: &Arc<RgbImage>, roll_deg: i32) {
         if let (Some(requests), false) = (&self.requests, self.busy) {
             // A thread that is gone shows when its boxes are asked for.
-            let _ = requests.send((Arc::clone(image), std::mem::take(&mut self.buffer)));
+            let _ = requests.send((Arc::clone(image), roll_deg, std::mem::take(&mut self.buffer)));
             self.busy = true;
         }
     }
@@ -115,7 +118,7 @@ mod tests {
     fn each_answer_belongs_to_its_image_and_an_error_ends_nothing() {
         let mut thread = DetectorThread::spawn(Box::new(Widths)).unwrap();
         for width in 10..16 {
-            thread.start(&Arc::new(RgbImage::new(width, 2)));
+            thread.start(&Arc::new(RgbImage::new(width, 2)), 0);
             match thread.finish().unwrap() {
                 Ok(boxes) => assert_eq!(boxes[0].bbox.x_max, width as f32),
                 Err(_) => assert_eq!(width, 13),
@@ -144,7 +147,7 @@ mod tests {
         let mut thread = DetectorThread::spawn(Box::new(Slow(told))).unwrap();
         for width in 10..13 {
             // Busy with the first: the others are passed over.
-            thread.start(&Arc::new(RgbImage::new(width, 2)));
+            thread.start(&Arc::new(RgbImage::new(width, 2)), 0);
             assert!(thread.poll().is_none());
         }
         go.send(()).unwrap();

@@ -73,6 +73,7 @@ mod right_eye;
 pub mod sensor;
 pub mod system;
 pub mod tracking;
+mod upright;
 
 pub use backend::Execution;
 pub use camera::Camera;
@@ -80,3 +81,4 @@ pub use config::Config;
 pub use detection::{BoundingBox, Detection, Detector, DetectorError};
 pub use frame::RgbdFrame;
 pub use system::{FrameRejected, MapUse, SetupError, Slam, Tracked};
+pub use upright::Upright;

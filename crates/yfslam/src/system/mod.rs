@@ -25,6 +25,7 @@ use crate::map::{KeyFrameId, Map};
 use crate::right_eye::{METRES_PER_UNIT, RightEye};
 use crate::sensor::SensorModel;
 use crate::tracking::{Initialiser, TrackedFrame, Tracker, TrackingState};
+use crate::upright::Down;
 pub use errors::{FrameRejected, SetupError};
 pub use times::StageTimes;
 use times::Stopwatch;
@@ -79,6 +80,7 @@ pub struct Slam {
     extracted: Features,
     tracker: Tracker,
     initialiser: Initialiser,
+    down: Down,
     owner: MapOwner,
     execution: Execution,
     state: TrackingState,
@@ -162,6 +164,7 @@ impl Slam {
             extracted: Features::default(),
             tracker: Tracker::default(),
             initialiser: Initialiser::default(),
+            down: Down::default(),
             state: TrackingState::NotInitialized,
             anchors: Vec::new(),
         })
@@ -262,6 +265,7 @@ impl Slam {
         self.owner.note(&mut self.tracker.sightings);
         if tracked {
             self.tracker.accept(self.owner.map());
+            self.down.see(&self.tracker.current.t_cam_world);
             if let Some(tie) = self.tracker.current.reference {
                 self.filter.end_frame(&self.config.dynamic, frame.timestamp_ns, tie);
             }
@@ -331,10 +335,23 @@ impl Slam {
     fn start_detector(&mut self, frame: &RgbdFrame) -> bool {
         let due = self.frames_seen.is_multiple_of(self.config.dynamic.detect_every);
         self.frames_seen += 1;
+        let roll_deg = self.roll_deg();
         if let Some(detector) = self.detector.as_mut().filter(|_| due && frame.detections.is_none()) {
-            detector.start(&frame.color);
+            detector.start(&frame.color, roll_deg);
         }
         due
+    }
+
+    /// How far the next picture has to be turned to be upright, degrees, as far as is known before its pose: what
+    /// [`Upright::detect`](crate::Upright::detect) is to be given for boxes that come with the frame.
+    pub fn roll_deg(&self) -> i32 {
+        match self.state {
+            TrackingState::NotInitialized => 0,
+            _ => {
+                let expected = self.tracker.predict(self.owner.map());
+                self.down.roll_deg(&expected, self.config.dynamic.upright_roll_deg)
+            }
+        }
     }
 
     /// Boxes of movable objects for this frame. Returns whether anybody looked for them: not if the detector fails, is late, or none are
