@@ -121,7 +121,7 @@ def sample(rng, draw, side, mosaic=0.35, strength=1.0):
     for (x0, x1), (y0, y1) in spans:
         image, boxes = draw(rng)
         single = len(spans) == 1
-        zoom = np.exp(rng.uniform(np.log(0.65), np.log(1.9))) if single else np.exp(rng.uniform(np.log(0.8), np.log(1.8)))
+        zoom = np.exp(rng.uniform(np.log(0.65), np.log(2.3))) if single else np.exp(rng.uniform(np.log(0.8), np.log(1.8)))
         zoom *= (352 / side) ** 0.3
         affine = matrix(rng, boxes, image.shape[0], x1 - x0, y1 - y0, zoom, strength * angle(rng))
         canvas[y0:y1, x0:x1] = cv2.warpAffine(image, affine, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR, borderValue=border)

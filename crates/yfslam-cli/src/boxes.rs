@@ -4,13 +4,15 @@
 //! with their boxes, found once.
 
 use std::fmt;
+use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use anyhow::{Result, bail};
 use serde::Serialize;
 use yfslam::dynamic::Method;
-use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError, Upright};
+use yfslam::image::Image;
+use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError, Upright, mask_of_classes};
 
 use crate::cpu;
 use crate::detector::{self, DetectorArgs, LoadedDetector, ModelIdentity, Took};
@@ -100,14 +102,22 @@ pub struct SharedDetector {
     times: Receiver<Took>,
     /// Indices of the classes that can move.
     movable: Vec<usize>,
-    /// What was found in the current frame, turned by how many degrees; `None` if no boxes are due.
-    found: Option<Vec<(i32, Vec<Detection>)>>,
+    /// What was found in the current frame, with a camera rolled by so many degrees; `None` if no boxes are due.
+    found: Option<Vec<(i32, Found)>>,
     /// As `dynamic.detect_every`.
     every: usize,
     /// Frames that no method refuses for their time, and the time of the last of them, ns.
     frames: usize,
     last_ns: Option<i64>,
     tally: DetectionTally,
+}
+
+/// What can move in a frame.
+#[derive(Clone, Debug, Default)]
+struct Found {
+    boxes: Vec<Detection>,
+    /// From a detector that segments.
+    mask: Option<Arc<Image<u8>>>,
 }
 
 /// What it took to find boxes for several methods at once.
@@ -164,17 +174,17 @@ impl SharedDetector {
 
     /// The frame with its boxes, or with none where none are due, for a method that knows its camera rolled by `roll_deg`.
     pub fn see(&mut self, frame: &RgbdFrame, roll_deg: i32) -> RgbdFrame {
-        let boxes = match &self.found {
-            None => Vec::new(),
+        let Found { boxes, mask } = match &self.found {
+            None => Found::default(),
             Some(found) => match found.iter().find(|(roll, _)| *roll == roll_deg) {
-                Some((_, boxes)) => boxes.clone(),
+                Some((_, found)) => found.clone(),
                 None => self.look(frame, roll_deg),
             },
         };
-        RgbdFrame { detections: Some(boxes), ..frame.clone() }
+        RgbdFrame { detections: Some(boxes), mask: frame.mask.clone().or(mask), ..frame.clone() }
     }
 
-    fn look(&mut self, frame: &RgbdFrame, roll_deg: i32) -> Vec<Detection> {
+    fn look(&mut self, frame: &RgbdFrame, roll_deg: i32) -> Found {
         let mut boxes = Vec::new();
         if let Err(error) = self.upright.detect(&mut *self.detector, &frame.color, roll_deg, &mut boxes) {
             tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
@@ -182,14 +192,16 @@ impl SharedDetector {
             self.tally.failures += 1;
         }
         boxes.retain(|detection| self.movable.contains(&detection.class));
+        let mask = self.upright.mask(&*self.detector).map(|mask| Arc::new(mask_of_classes(mask, &self.movable)));
         for took in self.times.try_iter() {
             self.tally.stages.push("detector", took.wall);
             self.tally.cpu = self.tally.cpu.zip(took.cpu).map(|(sum, took)| sum + took);
         }
-        if let Some(found) = &mut self.found {
-            found.push((roll_deg, boxes.clone()));
+        let found = Found { boxes, mask };
+        if let Some(earlier) = &mut self.found {
+            earlier.push((roll_deg, found.clone()));
         }
-        boxes
+        found
     }
 
     /// What it took.

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use crate::detection::{BoundingBox, Detection, Detector, DetectorError};
 use crate::geometry::Pose;
-use crate::image::RgbImage;
+use crate::image::{Image, RgbImage};
 
 /// Longer side of the upright copy at most, px: more than the network's input has.
 const MOST_PX: f32 = 448.0;
@@ -50,6 +50,8 @@ impl Down {
 #[derive(Debug, Default)]
 pub struct Upright {
     copy: RgbImage,
+    /// The detector's mask of the last picture, if that was turned.
+    mask: Option<Image<u8>>,
 }
 
 impl Upright {
@@ -65,6 +67,7 @@ impl Upright {
         roll_deg: i32,
         out: &mut Vec<Detection>,
     ) -> Result<(), DetectorError> {
+        self.mask = None;
         let Some(turn) = Turn::new(image, roll_deg) else { return detector.detect(image, out) };
         turn.copy(image, &mut self.copy);
         detector.detect(&self.copy, out)?;
@@ -72,7 +75,13 @@ impl Upright {
             detection.bbox = turn.back(&detection.bbox);
         }
         out.retain(|detection| detection.bbox.area() > 0.0);
+        self.mask = detector.mask().map(|mask| turn.back_mask(mask, image));
         Ok(())
+    }
+
+    /// As [`Detector::mask`], for the picture that was last given to `detector` here.
+    pub fn mask<'a>(&'a self, detector: &'a dyn Detector) -> Option<&'a Image<u8>> {
+        self.mask.as_ref().or_else(|| detector.mask())
     }
 }
 
@@ -121,6 +130,21 @@ impl Turn {
         }
     }
 
+    /// What a mask of the copy says of each pixel of the picture.
+    fn back_mask(&self, mask: &Image<u8>, image: &RgbImage) -> Image<u8> {
+        let mut back = Image::new(image.width(), image.height());
+        let Self { sin, cos, scale, middle, copy_middle, .. } = self;
+        for row in 0..image.height() {
+            let dy = (row as f32 + 0.5 - middle[1]) / scale;
+            for (column, pixel) in back.row_mut(row).iter_mut().enumerate() {
+                let dx = (column as f32 + 0.5 - middle[0]) / scale;
+                let (x, y) = (copy_middle[0] + cos * dx - sin * dy, copy_middle[1] + sin * dx + cos * dy);
+                *pixel = mask.get(x.max(0.0) as usize, y.max(0.0) as usize).copied().unwrap_or(0);
+            }
+        }
+        back
+    }
+
     /// From the copy's middle to the picture's corner, px.
     fn to_picture(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let Self { sin, cos, scale, middle, .. } = self;
@@ -163,10 +187,15 @@ mod tests {
 
     use super::*;
 
-    /// Finds the box of what is white.
-    struct White;
+    /// Finds the box of what is white, and its pixels.
+    #[derive(Default)]
+    struct White(Image<u8>);
 
     impl Detector for White {
+        fn mask(&self) -> Option<&Image<u8>> {
+            Some(&self.0)
+        }
+
         fn class_names(&self) -> &[String] {
             &[]
         }
@@ -183,6 +212,8 @@ mod tests {
                 }
             }
             out.push(Detection { class: 0, score: 1.0, bbox });
+            self.0 = Image::new(image.width(), image.height());
+            self.0.data_mut().iter_mut().zip(image.data()).for_each(|(class, pixel)| *class = u8::from(pixel[0] > 150));
             Ok(())
         }
     }
@@ -208,15 +239,19 @@ mod tests {
                 }
             }
             let (mut seen, mut found) = (Vec::new(), Vec::new());
-            White.detect(&image, &mut seen)?;
+            let (mut plain, mut other) = (White::default(), White::default());
+            plain.detect(&image, &mut seen)?;
             let mut upright = Upright::default();
-            upright.detect(&mut White, &image, roll, &mut found)?;
+            upright.detect(&mut other, &image, roll, &mut found)?;
             if roll != 0 {
                 let mut copy = Vec::new();
-                White.detect(&upright.copy, &mut copy)?;
+                White::default().detect(&upright.copy, &mut copy)?;
                 let BoundingBox { x_min, y_min, x_max, y_max } = copy[0].bbox;
                 prop_assert!(((y_max - y_min) / (x_max - x_min) / (b / a) - 1.0).abs() < 0.12, "{:?}", copy[0].bbox);
             }
+            let mask = upright.mask(&other).map(|mask| mask.data().iter().zip(plain.0.data()));
+            let [both, either] = [2, 1].map(|least| mask.clone().unwrap().filter(|(a, b)| **a + **b >= least).count());
+            prop_assert!(both as f32 > 0.9 * either as f32, "{both} {either}");
             prop_assert!(found[0].bbox.iou(&seen[0].bbox) > 0.9, "{:?} {:?}", found[0].bbox, seen[0].bbox);
         }
 
@@ -257,7 +292,7 @@ mod tests {
     #[test]
     fn an_empty_picture_is_left_to_the_detector() {
         let mut found = Vec::new();
-        Upright::default().detect(&mut White, &RgbImage::default(), 90, &mut found).unwrap();
+        Upright::default().detect(&mut White::default(), &RgbImage::default(), 90, &mut found).unwrap();
         assert_eq!(found.len(), 1);
     }
 }

@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use crate::backend::{Backend, Execution, MapOwner};
 use crate::camera::Camera;
 use crate::config::{Config, DepthSource};
-use crate::detection::{Detection, Detector};
+use crate::detection::{Detection, Detector, mask_of_classes};
 use crate::detector_thread::DetectorThread;
 use crate::dynamic::{DynamicFilter, Evidence, FirstPose};
 use crate::features::{Features, OrbExtractor};
@@ -90,6 +90,8 @@ pub struct Slam {
     /// Indices of the classes that can move.
     movable_classes: Vec<usize>,
     movable: Vec<Detection>,
+    /// Pixels of movable objects, from a detector that segments.
+    movable_mask: Option<Image<u8>>,
     detector_failures: usize,
     /// Frames that were not refused.
     frames_seen: usize,
@@ -142,6 +144,7 @@ impl Slam {
             detector: detector.map(DetectorThread::spawn).transpose()?,
             movable_classes,
             movable: Vec::new(),
+            movable_mask: None,
             detector_failures: 0,
             frames_seen: 0,
             last_timestamp_ns: None,
@@ -227,7 +230,7 @@ impl Slam {
         let evidence = Evidence {
             movable: &self.movable,
             looked,
-            mask: frame.mask.as_deref(),
+            mask: frame.mask.as_deref().or(self.movable_mask.as_ref()),
             gray: &self.gray,
             depth: &depth,
             sensor: &self.sensor,
@@ -358,6 +361,7 @@ impl Slam {
     /// due. Tracks carry such frames.
     fn collect_boxes(&mut self, frame: &RgbdFrame, due: bool) -> bool {
         self.movable.clear();
+        self.movable_mask = None;
         if let Some(known) = &frame.detections {
             self.movable.extend(known.iter().filter(|_| due));
             return due;
@@ -367,8 +371,9 @@ impl Slam {
         let waits = !self.config.dynamic.detect_async || self.state == TrackingState::NotInitialized;
         match if waits { detector.finish() } else { detector.poll() } {
             None => false,
-            Some(Ok(boxes)) => {
-                self.movable.extend(boxes.iter().filter(|d| self.movable_classes.contains(&d.class)));
+            Some(Ok(seen)) => {
+                self.movable.extend(seen.boxes.iter().filter(|d| self.movable_classes.contains(&d.class)));
+                self.movable_mask = seen.mask.as_ref().map(|mask| mask_of_classes(mask, &self.movable_classes));
                 true
             }
             Some(Err(error)) => {
