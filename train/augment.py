@@ -15,9 +15,9 @@ LEAST_SIDE = 9.0  # px
 def angle(rng):
     """Camera roll, degrees: mostly upright, often up to 45, at times up to 100."""
     kind = rng.random()
-    if kind < 0.5:
+    if kind < 0.55:
         return rng.normal(0, 5)
-    return rng.uniform(-45, 45) if kind < 0.8 else rng.uniform(-100, 100)
+    return rng.uniform(-45, 45) if kind < 0.9 else rng.uniform(-100, 100)
 
 
 def matrix(rng, boxes, source, width, height, zoom, theta):
@@ -121,7 +121,7 @@ def sample(rng, draw, side, mosaic=0.35, strength=1.0):
     for (x0, x1), (y0, y1) in spans:
         image, boxes = draw(rng)
         single = len(spans) == 1
-        zoom = np.exp(rng.uniform(np.log(0.65), np.log(1.9))) if single else np.exp(rng.uniform(np.log(0.8), np.log(1.8)))
+        zoom = np.exp(rng.uniform(np.log(0.65), np.log(2.3))) if single else np.exp(rng.uniform(np.log(0.8), np.log(1.8)))
         zoom *= (352 / side) ** 0.3
         affine = matrix(rng, boxes, image.shape[0], x1 - x0, y1 - y0, zoom, strength * angle(rng))
         canvas[y0:y1, x0:x1] = cv2.warpAffine(image, affine, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR, borderValue=border)

@@ -4,13 +4,15 @@
 //! with their boxes, found once.
 
 use std::fmt;
+use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use anyhow::{Result, bail};
 use serde::Serialize;
 use yfslam::dynamic::Method;
-use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError};
+use yfslam::image::Image;
+use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError, Upright, mask_of_classes};
 
 use crate::cpu;
 use crate::detector::{self, DetectorArgs, LoadedDetector, ModelIdentity, Took};
@@ -93,19 +95,29 @@ pub fn choose(
     Ok((BoxOrigin::Detector(loaded.identity.clone()), Some(loaded)))
 }
 
-/// A detector that sees each frame once, for several methods.
+/// A detector that sees each frame once, for several methods; where these disagree on how far the camera is rolled, once each.
 pub struct SharedDetector {
     detector: Box<dyn Detector>,
+    upright: Upright,
     times: Receiver<Took>,
     /// Indices of the classes that can move.
     movable: Vec<usize>,
-    found: Vec<Detection>,
+    /// What was found in the current frame, with a camera rolled by so many degrees; `None` if no boxes are due.
+    found: Option<Vec<(i32, Found)>>,
     /// As `dynamic.detect_every`.
     every: usize,
     /// Frames that no method refuses for their time, and the time of the last of them, ns.
     frames: usize,
     last_ns: Option<i64>,
     tally: DetectionTally,
+}
+
+/// What can move in a frame.
+#[derive(Clone, Debug, Default)]
+struct Found {
+    boxes: Vec<Detection>,
+    /// From a detector that segments.
+    mask: Option<Arc<Image<u8>>>,
 }
 
 /// What it took to find boxes for several methods at once.
@@ -136,40 +148,60 @@ impl SharedDetector {
             known.iter().position(|k| k == name).ok_or_else(unknown)
         };
         let movable = config.dynamic.movable.iter().map(index).collect::<Result<_, _>>()?;
-        let (found, tally) = (Vec::new(), DetectionTally::default());
         Ok(Self {
             detector,
+            upright: Upright::default(),
             times,
             movable,
-            found,
+            found: None,
             every: config.dynamic.detect_every,
             frames: 0,
             last_ns: None,
-            tally,
+            tally: DetectionTally::default(),
         })
     }
 
-    /// Puts its boxes into the frame, or none where no method asks for any.
-    pub fn see(&mut self, frame: &mut RgbdFrame) {
-        frame.detections = Some(Vec::new());
-        if self.last_ns.is_some_and(|last_ns| last_ns >= frame.timestamp_ns) {
-            return;
+    /// Comes to the next frame.
+    pub fn begin(&mut self, frame: &RgbdFrame) {
+        let refused = self.last_ns.is_some_and(|last_ns| last_ns >= frame.timestamp_ns);
+        let due = !refused && self.frames.is_multiple_of(self.every);
+        self.found = due.then(Vec::new);
+        if !refused {
+            self.last_ns = Some(frame.timestamp_ns);
+            self.frames += 1;
         }
-        self.last_ns = Some(frame.timestamp_ns);
-        self.frames += 1;
-        if !(self.frames - 1).is_multiple_of(self.every) {
-            return;
-        }
-        if let Err(error) = self.detector.detect(&frame.color, &mut self.found) {
+    }
+
+    /// The frame with its boxes, or with none where none are due, for a method that knows its camera rolled by `roll_deg`.
+    pub fn see(&mut self, frame: &RgbdFrame, roll_deg: i32) -> RgbdFrame {
+        let Found { boxes, mask } = match &self.found {
+            None => Found::default(),
+            Some(found) => match found.iter().find(|(roll, _)| *roll == roll_deg) {
+                Some((_, found)) => found.clone(),
+                None => self.look(frame, roll_deg),
+            },
+        };
+        RgbdFrame { detections: Some(boxes), mask: frame.mask.clone().or(mask), ..frame.clone() }
+    }
+
+    fn look(&mut self, frame: &RgbdFrame, roll_deg: i32) -> Found {
+        let mut boxes = Vec::new();
+        if let Err(error) = self.upright.detect(&mut *self.detector, &frame.color, roll_deg, &mut boxes) {
             tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
-            self.found.clear();
+            boxes.clear();
             self.tally.failures += 1;
         }
+        boxes.retain(|detection| self.movable.contains(&detection.class));
+        let mask = self.upright.mask(&*self.detector).map(|mask| Arc::new(mask_of_classes(mask, &self.movable)));
         for took in self.times.try_iter() {
             self.tally.stages.push("detector", took.wall);
             self.tally.cpu = self.tally.cpu.zip(took.cpu).map(|(sum, took)| sum + took);
         }
-        frame.detections = Some(self.found.iter().filter(|d| self.movable.contains(&d.class)).copied().collect());
+        let found = Found { boxes, mask };
+        if let Some(earlier) = &mut self.found {
+            earlier.push((roll_deg, found.clone()));
+        }
+        found
     }
 
     /// What it took.

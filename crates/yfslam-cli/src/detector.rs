@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde::Serialize;
-use yfslam::image::RgbImage;
+use yfslam::image::{Image, RgbImage};
 use yfslam::{Config, Detection, Detector, DetectorError};
 use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, YoloFastestV2};
 
@@ -150,5 +150,9 @@ impl Detector for Timed {
         // Whoever stopped listening does not need the time.
         let _ = self.times.send(Took { wall: started.elapsed(), cpu });
         result
+    }
+
+    fn mask(&self) -> Option<&Image<u8>> {
+        self.network.mask()
     }
 }

@@ -66,6 +66,47 @@ fn a_folder_gives_a_line_for_each_image_and_a_picture_with_its_boxes_the_same_on
     assert!(left.contains(&"mine.png".into()) && !left.contains(&"000007-old.png".into()));
 }
 
+/// Left, top, right and bottom edge of each box, best first.
+fn edges(image: &Value) -> Vec<[f64; 4]> {
+    let boxes = image["boxes"].as_array().unwrap().iter();
+    boxes.map(|found| std::array::from_fn(|side| found["bbox"][side].as_f64().unwrap())).collect()
+}
+
+#[test]
+fn people_seen_by_a_camera_that_lies_on_its_side_are_found_as_upright_ones_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    render(root);
+    fs::create_dir(root.join("lying")).unwrap();
+    for file in fs::read_dir(root.join("rec/rgb")).unwrap().map(|entry| entry.unwrap().path()) {
+        let upright = pixels(&file);
+        let (width, height) = (upright.width(), upright.height());
+        // What was right is up now: the camera is rolled clockwise.
+        let turned = |index: usize| *upright.get(width - 1 - index / height, index % height).unwrap();
+        let lying = RgbImage::from_vec(height, width, (0..width * height).map(turned).collect()).unwrap();
+        write_color_png(&root.join("lying").join(file.file_name().unwrap()), &lying).unwrap();
+    }
+    succeeds(root, &["detect", "rec/rgb", "--out", "upright", "-q"]);
+    succeeds(root, &["detect", "lying", "--out", "as-it-is", "-q"]);
+    succeeds(root, &["detect", "lying", "--roll", "90", "--out", "turned", "-q"]);
+    let [upright, as_it_is, turned] = ["upright", "as-it-is", "turned"].map(|out| boxes(&root.join(out)));
+    let all = |list: &Value| list["images"].as_array().unwrap().iter().map(edges).collect::<Vec<_>>();
+    let agreeing = |list: &Value| {
+        let pairs = all(&upright).into_iter().zip(all(list));
+        let near = |a: &[f64; 4], b: &[f64; 4]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 30.0);
+        pairs
+            .flat_map(|(a, b)| {
+                a.into_iter()
+                    .filter(|&[x0, y0, x1, y1]| b.iter().any(|found| near(&[y0, 640.0 - x1, y1, 640.0 - x0], found)))
+                    .collect::<Vec<_>>()
+            })
+            .count()
+    };
+    let known = all(&upright).concat().len();
+    assert!(known >= 8 && agreeing(&turned) * 10 >= known * 8, "{} of {known}", agreeing(&turned));
+    assert!(agreeing(&as_it_is) * 2 < known, "{} of {known}: nothing is shown", agreeing(&as_it_is));
+}
+
 #[test]
 fn a_higher_threshold_keeps_the_best_boxes_alone() {
     let folder = tempfile::tempdir().unwrap();

@@ -56,6 +56,21 @@ fn methods_share_a_detector_and_leave_what_each_leaves_with_its_own() {
 }
 
 #[test]
+fn pictures_of_a_rolled_camera_are_turned_for_the_detector_for_one_method_and_for_several() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let world = WALKING.replace("walking_xyz", "walking_rpy").replace("frames=30", "frames=60");
+    for (name, limit) in [("turned", 4.0), ("never", 180.0)] {
+        fs::create_dir(root.join(name)).unwrap();
+        fs::write(root.join(name).join("roll.toml"), format!("[dynamic]\nupright_roll_deg = {limit:?}\n")).unwrap();
+        let args = ["run", &world, "--detector", "embedded", "--config", "roll.toml"];
+        assert_same_together_and_alone(&root.join(name), &args);
+    }
+    let trajectory = |name: &str| fs::read(root.join(name).join("yf/trajectory.txt")).unwrap();
+    assert_ne!(trajectory("turned"), trajectory("never"));
+}
+
+#[test]
 fn a_detector_that_looks_at_every_third_frame_does_so_for_one_method_and_for_several() {
     let folder = tempfile::tempdir().unwrap();
     assert_same_together_and_alone(folder.path(), &["run", WALKING, "--detector", "embedded", "--detect-every", "3"]);

@@ -51,6 +51,49 @@ fn net(layout: &str) -> Net {
     net
 }
 
+/// The same in columns, with masks: of two prototypes the first is positive above the middle of the input, the second below; boxes with
+/// an even number show what is above, the others what is below.
+fn net_with_masks() -> Net {
+    let mut net = net("columns");
+    let number = |values: &[usize], data| Constant::Floats(values.to_vec(), data);
+    let coefficients = (0..2 * BOXES).map(|k| f32::from(u8::from(k % BOXES % 2 == k / BOXES))).collect();
+    net.constants.insert("coefficients".into(), number(&[1, 2, BOXES], coefficients));
+    let side = |k: usize| if (k / 960 == 0) == (k % 960 / 40 < 12) { 1.0 } else { -1.0 };
+    net.constants.insert("sides".into(), number(&[1, 2, 24, 40], (0..1920).map(side).collect()));
+    net.constants.insert("naught".into(), number(&[1, 1, 1, 1], vec![0.0]));
+    let bare = net.outputs[0].0.clone();
+    let output = net.node("Concat", &[&bare, "coefficients"], "with_masks", vec![("axis", Attribute::Int(1))]);
+    let mean = net.node("GlobalAveragePool", &["image"], "again", vec![]);
+    net.constants.insert("first".into(), Constant::Ints(vec![4], vec![1, 3, 1, 1]));
+    let mean = net.node("Reshape", &[&mean, "first"], "four", vec![]);
+    let sum = net.node("ReduceSum", &[&mean], "sum", vec![]);
+    let nothing = net.node("Mul", &["naught", &sum], "nothing", vec![]);
+    let prototypes = net.node("Add", &["sides", &nothing], "prototypes", vec![]);
+    net.outputs = vec![(output, vec![1, 9, BOXES]), (prototypes, vec![1, 2, 24, 40])];
+    net
+}
+
+#[test]
+fn masks_show_the_class_of_each_object_within_its_box() {
+    let config = DetectorConfig::default();
+    let mut detector = AnyYolo::from_bytes("test.onnx", &net_with_masks().to_onnx(), &config).unwrap();
+    let mut found = Vec::new();
+    // Twice the size of the input; boxes are 16 px wide every 20 px, from row 64 to row 96, the middle is row 96: what is below is not seen.
+    detector.detect(&image(320, 192, [0, 255, 0]), &mut found).unwrap();
+    assert_eq!(found.len(), BOXES);
+    let mask = detector.mask().unwrap();
+    assert_eq!((mask.width(), mask.height()), (320, 192));
+    let shown = |x: usize, y: usize| *mask.get(x, y).unwrap();
+    assert_eq!(
+        [shown(40, 80), shown(80, 80), shown(60, 80), shown(40, 60), shown(40, 100), shown(29, 80)],
+        [2, 2, 0, 0, 0, 0]
+    );
+    assert_eq!(mask.data().iter().filter(|class| **class == 2).count(), 6 * 16 * 32);
+    let mut plain = AnyYolo::from_bytes("test.onnx", &net("columns").to_onnx(), &config).unwrap();
+    plain.detect(&image(320, 192, [0, 255, 0]), &mut found).unwrap();
+    assert!(plain.mask().is_none());
+}
+
 fn image(width: usize, height: usize, color: [u8; 3]) -> RgbImage {
     RgbImage::from_vec(width, height, vec![color; width * height]).unwrap()
 }

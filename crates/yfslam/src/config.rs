@@ -254,6 +254,9 @@ config_section! {
         /// Whether boxes are used when they are ready, perhaps some frames late, so that no frame waits for the detector once there is a
         /// map: for boards on which it is slower than the camera. Results then differ from run to run.
         detect_async: bool = false,
+        /// Roll of the camera, against how it was held on average, above which the detector is given a picture turned upright, degrees;
+        /// 180 never turns any. Networks know people who stand.
+        upright_roll_deg: f64 = 20.0,
         /// Score at which a box opens a track, and counts for `boxes`. Source: demo threshold of YOLO-FastestV2.
         open_score: f32 = 0.3,
         /// Score at which a box keeps a track.

@@ -1,6 +1,6 @@
 //! The door to object detection: the core knows boxes, not networks.
 
-use crate::image::RgbImage;
+use crate::image::{Image, RgbImage};
 
 /// An axis-aligned box in pixels of the full image; pixel `(x, y)` is inside if `x_min <= x < x_max`, y alike.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,4 +66,29 @@ pub trait Detector: Send {
     /// # Errors
     /// If the image cannot be processed, for example because it is empty.
     fn detect(&mut self, image: &RgbImage, out: &mut Vec<Detection>) -> Result<(), DetectorError>;
+
+    /// What each pixel of the image seen last shows: 0 where nothing was found, else 1 + its class (of the first 255). `None` from
+    /// networks that find boxes alone.
+    fn mask(&self) -> Option<&Image<u8>> {
+        None
+    }
+}
+
+/// The pixels of a [`Detector::mask`] that show one of these classes; the others become 0.
+pub fn mask_of_classes(mask: &Image<u8>, classes: &[usize]) -> Image<u8> {
+    let keeps: [bool; 256] = std::array::from_fn(|value| value > 0 && classes.contains(&(value - 1)));
+    let mut kept = mask.clone();
+    kept.data_mut().iter_mut().filter(|value| !keeps[usize::from(**value)]).for_each(|value| *value = 0);
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mask_keeps_the_classes_that_are_asked_for() {
+        let mask = Image::from_vec(3, 2, vec![0, 1, 2, 3, 2, 255]).unwrap();
+        assert_eq!(mask_of_classes(&mask, &[1, 254, 700]).data(), [0, 0, 2, 0, 2, 255]);
+    }
 }

@@ -8,17 +8,28 @@ use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::JoinHandle;
 
 use crate::detection::{Detection, Detector, DetectorError};
-use crate::image::RgbImage;
+use crate::image::{Image, RgbImage};
+use crate::upright::Upright;
 
-type Answer = (Result<(), DetectorError>, Vec<Detection>);
+type Request = (Arc<RgbImage>, i32, Vec<Detection>);
+type Answer = (Result<(), DetectorError>, Seen);
+
+/// What the detector saw in an image.
+#[derive(Debug, Default)]
+pub struct Seen {
+    /// Boxes, best score first.
+    pub boxes: Vec<Detection>,
+    /// As [`Detector::mask`].
+    pub mask: Option<Image<u8>>,
+}
 
 /// Runs a [`Detector`] beside the calling thread.
 pub struct DetectorThread {
     /// `None` once the thread was told to end.
-    requests: Option<SyncSender<(Arc<RgbImage>, Vec<Detection>)>>,
+    requests: Option<SyncSender<Request>>,
     answers: Receiver<Answer>,
     thread: Option<JoinHandle<()>>,
-    buffer: Vec<Detection>,
+    seen: Seen,
     /// Whether an image was handed over whose boxes were not taken yet.
     busy: bool,
 }
@@ -29,38 +40,40 @@ impl DetectorThread {
     /// # Errors
     /// If the operating system grants no thread.
     pub fn spawn(mut detector: Box<dyn Detector>) -> std::io::Result<Self> {
-        let (requests, inbox) = sync_channel::<(Arc<RgbImage>, Vec<Detection>)>(1);
+        let (requests, inbox) = sync_channel::<Request>(1);
         let (outbox, answers) = sync_channel(1);
         let thread = std::thread::Builder::new().name("detector".to_owned()).spawn(move || {
-            for (image, mut boxes) in inbox {
-                let result = detector.detect(&image, &mut boxes);
-                if outbox.send((result, boxes)).is_err() {
+            let mut upright = Upright::default();
+            for (image, roll_deg, mut boxes) in inbox {
+                let result = upright.detect(&mut *detector, &image, roll_deg, &mut boxes);
+                let mask = upright.mask(&*detector).cloned();
+                if outbox.send((result, Seen { boxes, mask })).is_err() {
                     return;
                 }
             }
         })?;
-        Ok(Self { requests: Some(requests), answers, thread: Some(thread), buffer: Vec::new(), busy: false })
+        Ok(Self { requests: Some(requests), answers, thread: Some(thread), seen: Seen::default(), busy: false })
     }
 
-    /// Hands over the image of this frame, unless the boxes of an earlier one were not taken yet.
-    pub fn start(&mut self, image: &Arc<RgbImage>) {
+    /// Hands over the image of this frame and the roll of its camera, degrees, unless the boxes of an earlier one were not taken yet.
+    pub fn start(&mut self, image: &Arc<RgbImage>, roll_deg: i32) {
         if let (Some(requests), false) = (&self.requests, self.busy) {
             // A thread that is gone shows when its boxes are asked for.
-            let _ = requests.send((Arc::clone(image), std::mem::take(&mut self.buffer)));
+            let _ = requests.send((Arc::clone(image), roll_deg, std::mem::take(&mut self.seen.boxes)));
             self.busy = true;
         }
     }
 
-    /// Waits for the boxes of the image handed over last; `None` if they were taken already.
+    /// Waits for what was seen in the image handed over last; `None` if it was taken already.
     ///
     /// The error says that the detector could not process the image, or that its thread has ended.
-    pub fn finish(&mut self) -> Option<Result<&[Detection], DetectorError>> {
+    pub fn finish(&mut self) -> Option<Result<&Seen, DetectorError>> {
         let answer = self.busy.then(|| self.answers.recv().map_err(|_| ended()))?;
         Some(self.take(answer))
     }
 
-    /// The boxes of the image handed over last if they are ready; never waits. Errors as in [`DetectorThread::finish`].
-    pub fn poll(&mut self) -> Option<Result<&[Detection], DetectorError>> {
+    /// What was seen in the image handed over last if it is ready; never waits. Errors as in [`DetectorThread::finish`].
+    pub fn poll(&mut self) -> Option<Result<&Seen, DetectorError>> {
         let answer = match self.answers.try_recv() {
             _ if !self.busy => return None,
             Err(TryRecvError::Empty) => return None,
@@ -69,11 +82,11 @@ impl DetectorThread {
         Some(self.take(answer))
     }
 
-    fn take(&mut self, answer: Result<Answer, DetectorError>) -> Result<&[Detection], DetectorError> {
+    fn take(&mut self, answer: Result<Answer, DetectorError>) -> Result<&Seen, DetectorError> {
         self.busy = false;
-        let (result, boxes) = answer?;
-        self.buffer = boxes;
-        result.map(|()| self.buffer.as_slice())
+        let (result, seen) = answer?;
+        self.seen = seen;
+        result.map(|()| &self.seen)
     }
 }
 
@@ -115,9 +128,9 @@ mod tests {
     fn each_answer_belongs_to_its_image_and_an_error_ends_nothing() {
         let mut thread = DetectorThread::spawn(Box::new(Widths)).unwrap();
         for width in 10..16 {
-            thread.start(&Arc::new(RgbImage::new(width, 2)));
+            thread.start(&Arc::new(RgbImage::new(width, 2)), 0);
             match thread.finish().unwrap() {
-                Ok(boxes) => assert_eq!(boxes[0].bbox.x_max, width as f32),
+                Ok(seen) => assert_eq!(seen.boxes[0].bbox.x_max, width as f32),
                 Err(_) => assert_eq!(width, 13),
             }
             assert!(thread.finish().is_none() && thread.poll().is_none(), "each answer is given once");
@@ -144,17 +157,17 @@ mod tests {
         let mut thread = DetectorThread::spawn(Box::new(Slow(told))).unwrap();
         for width in 10..13 {
             // Busy with the first: the others are passed over.
-            thread.start(&Arc::new(RgbImage::new(width, 2)));
+            thread.start(&Arc::new(RgbImage::new(width, 2)), 0);
             assert!(thread.poll().is_none());
         }
         go.send(()).unwrap();
-        let boxes = loop {
+        let seen = loop {
             match thread.poll() {
-                Some(boxes) => break boxes.unwrap(),
+                Some(seen) => break seen.unwrap(),
                 None => std::thread::yield_now(),
             }
         };
-        assert_eq!(boxes[0].bbox.x_max, 10.0);
+        assert_eq!(seen.boxes[0].bbox.x_max, 10.0);
         assert!(thread.poll().is_none());
     }
 }

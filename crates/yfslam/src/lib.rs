@@ -73,10 +73,12 @@ mod right_eye;
 pub mod sensor;
 pub mod system;
 pub mod tracking;
+mod upright;
 
 pub use backend::Execution;
 pub use camera::Camera;
 pub use config::Config;
-pub use detection::{BoundingBox, Detection, Detector, DetectorError};
+pub use detection::{BoundingBox, Detection, Detector, DetectorError, mask_of_classes};
 pub use frame::RgbdFrame;
 pub use system::{FrameRejected, MapUse, SetupError, Slam, Tracked};
+pub use upright::Upright;

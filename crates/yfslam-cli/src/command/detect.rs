@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use yfslam::image::RgbImage;
-use yfslam::{Detection, Detector};
+use yfslam::{Detection, DetectorError, Upright};
 use yfslam_detect::DetectorConfig;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
@@ -24,6 +24,7 @@ Examples:
   yfslam detect photo.jpg --pictures
   yfslam detect rgbd_bonn_crowd/rgb --score 0.5 --out crowd
   yfslam detect images/ --detector yolo-fastestv2.onnx --class person,chair
+  yfslam detect images/ --roll 90      taken by a camera that lay on its right side
 
 In the output folder:
   boxes.json   each image, a line: its boxes with class, score, and left, top, right and bottom edge in px
@@ -54,6 +55,10 @@ pub struct DetectArgs {
     /// Report these classes alone [default: all that the network knows].
     #[arg(long = "class", value_name = "NAME,NAME", value_delimiter = ',', help_heading = "System")]
     classes: Vec<String>,
+    /// How far the camera was rolled clockwise, degrees: boxes are found in the images turned upright.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0, allow_negative_numbers = true, help_heading = "System")]
+    #[arg(value_parser = clap::value_parser!(i32).range(-180..=180))]
+    roll: i32,
     /// Where results go.
     #[arg(long, value_name = "DIR", default_value = "yfslam-out/detect", help_heading = "Output")]
     out: PathBuf,
@@ -82,8 +87,10 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
         images: Vec::new(),
     };
     let mut progress = Progress::new(terminal, "detect", files.len());
+    let mut upright = Upright::default();
     for (index, file) in files.iter().enumerate() {
-        let look = match look(file, &mut *detector) {
+        let mut find = |image: &RgbImage, found: &mut _| upright.detect(&mut *detector, image, args.roll, found);
+        let look = match look(file, &mut find) {
             Ok((image, detections)) => {
                 let of = |d: Detection| Some(FoundBox::new(d, known.get(d.class).map(String::as_str).filter(wanted)?));
                 let boxes: Vec<FoundBox> = detections.into_iter().filter_map(of).collect();
@@ -168,10 +175,13 @@ fn pictures(out: &OutputFolder) -> Result<PathBuf> {
 }
 
 /// Reads an image and finds boxes in it.
-fn look(file: &Path, detector: &mut dyn Detector) -> Result<(RgbImage, Vec<Detection>)> {
+fn look(
+    file: &Path,
+    find: &mut dyn FnMut(&RgbImage, &mut Vec<Detection>) -> Result<(), DetectorError>,
+) -> Result<(RgbImage, Vec<Detection>)> {
     let bytes = std::fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
     let (mut image, mut found) = (RgbImage::default(), Vec::new());
     decode_color(&bytes, None, &mut image).map_err(|error| anyhow!("{} {error}", file.display()))?;
-    detector.detect(&image, &mut found).with_context(|| file.display().to_string())?;
+    find(&image, &mut found).with_context(|| file.display().to_string())?;
     Ok((image, found))
 }

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Command, FromArgMatches};
-use yfslam::Config;
 use yfslam::config::DepthSource;
 use yfslam::dynamic::Method;
+use yfslam::{Config, RgbdFrame};
 use yfslam_eval::TableStyle;
 
 use crate::accuracy::MatchArgs;
@@ -21,7 +21,7 @@ use crate::pipeline::Stages;
 use crate::progress::Progress;
 use crate::report::{Report, Run};
 use crate::settings::{MethodArg, SettingsArgs, describe};
-use crate::source::{MaskTally, Source, SourceArgs, Truth};
+use crate::source::{MaskTally, Skip, Source, SourceArgs, Truth};
 use crate::summary;
 use crate::terminal::{Terminal, explain};
 
@@ -247,18 +247,18 @@ fn drive(
     let mut progress = Progress::new(terminal, &source.name, source.stamps_ns.len());
     let mut reading = Stages::default();
     while lanes.iter().any(|lane| !lane.has_failed())
-        && let Some(mut frame) = source.frames.next(&mut reading)
+        && let Some(frame) = source.frames.next(&mut reading)
     {
-        if let (Some(detector), Ok(frame)) = (&mut detector, &mut frame) {
-            detector.see(frame);
-        }
-        let frame = &frame;
+        let given = hand_out(frame, detector.as_deref_mut(), lanes);
         std::thread::scope(|scope| {
-            let Some((first, others)) = lanes.split_first_mut() else { return };
-            for lane in others {
+            let mut work = lanes.iter_mut().zip(&given);
+            let first = work.next();
+            for (lane, frame) in work {
                 scope.spawn(|| lane.take(frame));
             }
-            first.take(frame);
+            if let Some((lane, frame)) = first {
+                lane.take(frame);
+            }
         });
         if let Some(first) = lanes.first() {
             progress.frame(first.pipeline.frames(), first.state);
@@ -266,6 +266,21 @@ fn drive(
     }
     progress.finish();
     reading
+}
+
+/// The frame for each lane, with boxes from a detector that they share.
+fn hand_out(
+    frame: Result<RgbdFrame, Skip>,
+    detector: Option<&mut SharedDetector>,
+    lanes: &[Lane],
+) -> Vec<Result<RgbdFrame, Skip>> {
+    let (Some(detector), Ok(frame)) = (detector, &frame) else { return vec![frame; lanes.len()] };
+    detector.begin(frame);
+    let frame_for = |lane: &Lane| {
+        let needs_boxes = lane.config.dynamic.method.needs_boxes();
+        Ok(if needs_boxes { detector.see(frame, lane.pipeline.slam().roll_deg()) } else { frame.clone() })
+    };
+    lanes.iter().map(frame_for).collect()
 }
 
 /// The results of all lanes. One of several that has none is told of.

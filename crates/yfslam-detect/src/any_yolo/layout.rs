@@ -47,35 +47,48 @@ impl Layout {
         }
     }
 
-    /// Appends every box whose score exceeds `threshold`, px of the network input, to `out`. `values` are those of an output of `shape`.
-    pub(super) fn candidates(self, shape: &[usize], values: &[f32], threshold: f32, out: &mut Vec<Detection>) {
+    /// Appends every box whose score exceeds `threshold`, px of the network input, to `out`, with its number. `values` are those of an
+    /// output of `shape`.
+    pub(super) fn candidates(self, shape: &[usize], values: &[f32], threshold: f32, out: &mut Vec<(Detection, usize)>) {
         let &[_, rows, columns] = shape else { return };
         let at = |row: usize, column: usize| values.get(row * columns + column).copied().unwrap_or_default();
-        let mut push = |class: usize, score: f32, bbox: BoundingBox| {
+        let mut push = |n: usize, class: usize, score: f32, bbox: BoundingBox| {
             if score > threshold && score.is_finite() && bbox.area().is_finite() {
-                out.push(Detection { class, score: score.min(1.0), bbox });
+                out.push((Detection { class, score: score.min(1.0), bbox }, n));
             }
         };
         match self {
             Self::Columns { classes } => {
                 for n in 0..columns {
                     let (class, score) = best((0..classes).map(|class| at(4 + class, n)));
-                    push(class, score, around([0, 1, 2, 3].map(|k| at(k, n))));
+                    push(n, class, score, around([0, 1, 2, 3].map(|k| at(k, n))));
                 }
             }
             Self::Rows { classes } => {
                 for n in 0..rows {
                     let (class, share) = best((0..classes).map(|class| at(n, 5 + class)));
-                    push(class, at(n, 4) * share, around([0, 1, 2, 3].map(|k| at(n, k))));
+                    push(n, class, at(n, 4) * share, around([0, 1, 2, 3].map(|k| at(n, k))));
                 }
             }
             Self::Final => {
                 for n in 0..rows {
                     let [x_min, y_min, x_max, y_max, score, class] = [0, 1, 2, 3, 4, 5].map(|k| at(n, k));
-                    push(class as usize, score, BoundingBox { x_min, y_min, x_max, y_max });
+                    push(n, class as usize, score, BoundingBox { x_min, y_min, x_max, y_max });
                 }
             }
         }
+    }
+
+    /// What follows the classes of box `n`, `masks` numbers: its coefficients.
+    pub(super) fn coefficients(self, shape: &[usize], values: &[f32], n: usize, masks: usize) -> Vec<f32> {
+        let &[_, _, columns] = shape else { return Vec::new() };
+        let at = |row: usize, column: usize| values.get(row * columns + column).copied().unwrap_or_default();
+        let one = |k: usize| match self {
+            Self::Columns { classes } => at(4 + classes + k, n),
+            Self::Rows { classes } => at(n, 5 + classes + k),
+            Self::Final => at(n, 6 + k),
+        };
+        (0..masks).map(one).collect()
     }
 }
 

@@ -55,6 +55,11 @@ impl Letterbox {
         }
     }
 
+    /// A position in the image that was put there last as one in the input, px.
+    pub(super) fn to_input(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        [x * self.scale[0] + self.offset[0] as f32, y * self.scale[1] + self.offset[1] as f32]
+    }
+
     /// A box in the input as one in the image that was put there last, whose sides are given; cut off at its edges.
     pub(super) fn to_image(&self, bbox: BoundingBox, [width, height]: [usize; 2]) -> BoundingBox {
         let x = |x: f32| ((x - self.offset[0] as f32) / self.scale[0]).clamp(0.0, width as f32);

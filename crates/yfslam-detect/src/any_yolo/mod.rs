@@ -1,17 +1,17 @@
-//! YOLO networks of other architectures: an ONNX file for `rten` and an image in, boxes out.
+//! YOLO networks of other architectures: an ONNX file for `rten` and an image in, boxes out, and masks from a network that segments.
 //!
-//! Red, green, blue in [0, 1], the image made to fit with grey margins; boxes in one of three [`Layout`]s. Masks of a network that
-//! segments are not read: the core knows boxes.
+//! Red, green, blue in [0, 1], the image made to fit with grey margins; boxes in one of three [`Layout`]s.
 
 mod layout;
 mod letterbox;
+mod masks;
 
 use fearless_simd::Level;
 use rten::{Model as Runtime, Value, ValueOrView};
 use rten_tensor::Layout as _;
 use rten_tensor::prelude::*;
 use rten_tensor::{NdTensorView, TensorView};
-use yfslam::image::RgbImage;
+use yfslam::image::{Image, RgbImage};
 use yfslam::{Detection, Detector, DetectorError};
 
 use crate::decode::suppress;
@@ -20,6 +20,7 @@ use crate::yolo::{check, class_names, parse_names};
 use crate::{DetectorConfig, ModelError};
 use layout::Layout;
 use letterbox::Letterbox;
+use masks::Prototypes;
 
 /// Sides of an input that a network may have, px.
 const SIDES: std::ops::RangeInclusive<usize> = 32..=4096;
@@ -44,7 +45,9 @@ pub struct AnyYolo {
     letterbox: Letterbox,
     config: DetectorConfig,
     class_names: Vec<String>,
-    candidates: Vec<Detection>,
+    candidates: Vec<(Detection, usize)>,
+    /// What each pixel of the last image shows, if the network segments.
+    mask: Option<Image<u8>>,
 }
 
 impl AnyYolo {
@@ -69,7 +72,7 @@ impl AnyYolo {
             given => given,
         });
         let class_names = class_names(&model, config, classes).map_err(mismatch)?;
-        Ok(Self { runtime, layout, letterbox, config: config.clone(), class_names, candidates: Vec::new() })
+        Ok(Self { runtime, layout, letterbox, config: config.clone(), class_names, candidates: Vec::new(), mask: None })
     }
 }
 
@@ -86,20 +89,41 @@ impl Detector for AnyYolo {
         }
         self.letterbox.put(Level::new(), image);
         let outputs = run(&self.runtime, &self.letterbox).map_err(DetectorError)?;
-        let output: TensorView<f32> = match outputs.first().map(TryInto::try_into) {
-            Some(Ok(output)) => output,
-            _ => return Err(DetectorError("the network's first output holds no floats".into())),
-        };
-        let (shape, values) = (output.shape().to_vec(), output.to_vec());
+        let (shape, values) = floats(outputs.first())
+            .ok_or_else(|| DetectorError("the network's first output holds no floats".into()))?;
         self.candidates.clear();
         self.layout.candidates(&shape, &values, self.config.score_threshold, &mut self.candidates);
         // What suppression leaves of boxes that were suppressed already is all of them.
         let iou_threshold = if self.layout == Layout::Final { 1.0 } else { self.config.iou_threshold };
-        suppress(&mut self.candidates, &DetectorConfig { iou_threshold, ..DetectorConfig::default() }, out);
+        let mut boxes: Vec<Detection> = self.candidates.iter().map(|(found, _)| *found).collect();
+        suppress(&mut boxes, &DetectorConfig { iou_threshold, ..DetectorConfig::default() }, out);
+        let number = |found: &Detection| self.candidates.iter().find(|(other, _)| other == found).map(|(_, n)| *n);
+        let numbers: Vec<_> = out.iter().map(number).collect();
         out.iter_mut().for_each(|found| found.bbox = self.letterbox.to_image(found.bbox, sides));
+        // Prototypes are all there is with four dimensions.
+        let prototypes = outputs.iter().skip(1).filter_map(|o| floats(Some(o))).find(|(shape, _)| shape.len() == 4);
+        self.mask = prototypes.map(|(whole, prototypes)| {
+            let prototypes = Prototypes { values: &prototypes, shape: [whole[1], whole[2], whole[3]] };
+            let mut mask = Image::new(sides[0], sides[1]);
+            for (found, n) in out.iter().zip(&numbers) {
+                let coefficients = n.map(|n| self.layout.coefficients(&shape, &values, n, whole[1]));
+                prototypes.draw(&coefficients.unwrap_or_default(), found, &self.letterbox, &mut mask);
+            }
+            mask
+        });
         out.retain(|found| found.class < self.class_names.len() && found.bbox.area() > 0.0);
         Ok(())
     }
+
+    fn mask(&self) -> Option<&Image<u8>> {
+        self.mask.as_ref()
+    }
+}
+
+/// Shape and values of an output.
+fn floats(output: Option<&Value>) -> Option<(Vec<usize>, Vec<f32>)> {
+    let output: TensorView<f32> = output?.try_into().ok()?;
+    Some((output.shape().to_vec(), output.to_vec()))
 }
 
 /// Height and width of the only input.

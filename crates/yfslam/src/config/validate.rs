@@ -23,7 +23,7 @@ impl Config {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let share = |x: f64| (0.0..=1.0).contains(&x);
         let (f, d, s, t) = (&self.features, &self.depth, &self.stereo, &self.tracking);
-        let checks: [(&'static str, String, bool, &'static str); 28] = [
+        let checks: [(&'static str, String, bool, &'static str); 29] = [
             ("features.count", f.count.to_string(), f.count > 0, "at least 1"),
             ("features.levels", f.levels.to_string(), (1..=16).contains(&f.levels), "from 1 to 16"),
             (
@@ -78,6 +78,12 @@ impl Config {
                 self.dynamic.detect_every.to_string(),
                 self.dynamic.detect_every > 0,
                 "at least 1 frame",
+            ),
+            (
+                "dynamic.upright_roll_deg",
+                self.dynamic.upright_roll_deg.to_string(),
+                (0.0..=180.0).contains(&self.dynamic.upright_roll_deg),
+                "from 0 to 180 degrees",
             ),
             (
                 "dynamic.open_score",

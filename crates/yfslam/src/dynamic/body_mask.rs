@@ -142,6 +142,45 @@ impl BodyMask {
         Extent { middle: [middle(column), middle(row)], cells }
     }
 
+    /// How far away what a mask marked in a box is, m, infinite where that was not measured; `None` if it fills less than
+    /// `config.body_min_share` of the box.
+    pub fn masked_depth(&mut self, config: &DynamicConfig, bbox: &BoundingBox) -> Option<f32> {
+        let cells = self.collect_masked(bbox);
+        if self.body.is_empty() || (self.body.len() as f32) < config.body_min_share * cells as f32 {
+            return None;
+        }
+        self.body.retain(|reached| reached.depth_m > 0.0);
+        let middle = self.body.len() / 2;
+        if self.body.is_empty() {
+            return Some(f32::INFINITY);
+        }
+        let (_, median, _) = self.body.select_nth_unstable_by(middle, |a, b| a.depth_m.total_cmp(&b.depth_m));
+        Some(median.depth_m)
+    }
+
+    /// Gives what a mask marked in a box to a track. Returns what that is.
+    pub fn claim(&mut self, track: usize, bbox: &BoundingBox) -> Extent {
+        self.collect_masked(bbox);
+        for reached in &self.body {
+            self.owner[reached.cell as usize] = owner(track);
+        }
+        self.extent()
+    }
+
+    /// Makes what a mask marked in a box the body. Returns how many cells the box has.
+    fn collect_masked(&mut self, bbox: &BoundingBox) -> usize {
+        let [left, top, right, bottom] = self.cells(bbox, 0.0);
+        self.body.clear();
+        for row in top..bottom {
+            for cell in row * self.columns + left..row * self.columns + right.max(left) {
+                if self.owner[cell] == NO_TRACK {
+                    self.body.push(Reached { cell: cell as u32, depth_m: self.depth_m[cell], gap: 0 });
+                }
+            }
+        }
+        bottom.saturating_sub(top) * right.saturating_sub(left)
+    }
+
     /// Marks the cells whose middle a mask of movable objects covers.
     pub fn mark_mask(&mut self, mask: &Image<u8>) {
         for (row, line) in self.owner.chunks_mut(self.columns.max(1)).enumerate() {
@@ -348,6 +387,23 @@ mod tests {
         let (bodies, mut free) = (outlined(2.0), Vec::new());
         bodies.free_depths(&BoundingBox { x_min: 100.0, y_min: 40.0, x_max: 200.0, y_max: 240.0 }, &mut free);
         assert!(!free.is_empty() && free.iter().all(|z| *z == 4.0), "{free:?}");
+    }
+
+    #[test]
+    fn what_a_mask_shows_in_a_box_is_the_body_of_its_track() {
+        let config = DynamicConfig::default();
+        let (mut bodies, mut mask) = (BodyMask::default(), Image::new(320, 240));
+        bodies.begin(&depth(|x, _| if x < 160 { 2000 } else { 3000 }));
+        let bbox = BoundingBox { x_min: 80.0, y_min: 40.0, x_max: 240.0, y_max: 200.0 };
+        assert_eq!(bodies.masked_depth(&config, &bbox), None);
+        (80..160).for_each(|y| mask.row_mut(y)[100..180].fill(1u8));
+        bodies.mark_mask(&mask);
+        assert_eq!(bodies.masked_depth(&config, &bbox), Some(2.0));
+        let body = bodies.claim(4, &bbox);
+        assert_eq!((body.cells, body.middle), (400, [138.0, 118.0]));
+        assert_eq!(bodies.masked_depth(&config, &bbox), None, "it is given once");
+        let far = BoundingBox { x_min: 0.0, x_max: 320.0, y_min: 0.0, y_max: 240.0 };
+        assert_eq!(bodies.masked_depth(&config, &far), None);
     }
 
     #[test]

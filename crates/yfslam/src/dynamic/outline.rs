@@ -32,12 +32,30 @@ impl Outlines {
         self.waiting.clear();
         self.waiting
             .extend((0..tracks.list.len()).filter(|&t| !tracks.list[t].ended && tracks.list[t].score >= min_score));
+        self.adopt(config, tracks);
         while let Some((t, center_m)) = self.nearest(config, groups, tracks) {
             self.waiting.retain(|&w| w != t);
             let track = &mut tracks.list[t];
             track.depth_m = Some(center_m);
             let body = self.bodies.grow(config, t, &track.bbox, center_m);
             track.note_body(config, &body);
+        }
+    }
+
+    /// What a mask shows in the box of a track is its body, and nothing else there: the nearest first, whose boxes reach into those of
+    /// others.
+    fn adopt(&mut self, config: &DynamicConfig, tracks: &mut Tracks) {
+        loop {
+            let bodies = &mut self.bodies;
+            let masked = |t: &usize| bodies.masked_depth(config, &tracks.list[*t].bbox).map(|z| (z, *t));
+            let nearest = self.waiting.iter().filter_map(masked).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let Some((center_m, t)) = nearest else { return };
+            self.waiting.retain(|&w| w != t);
+            let track = &mut tracks.list[t];
+            if center_m.is_finite() {
+                track.depth_m = Some(center_m);
+            }
+            track.note_body(config, &self.bodies.claim(t, &track.bbox));
         }
     }
 

@@ -6,6 +6,7 @@ use crate::frame::RgbdFrame;
 use crate::map::KeyFrameId;
 use crate::system::MapUse;
 use crate::tracking::TrackingState;
+use crate::upright::Down;
 
 impl Slam {
     /// Whether the frame has the features, and the depths, that a map needs.
@@ -71,6 +72,7 @@ impl Slam {
         }
         self.filter.forget_views();
         self.tracker.reset();
+        self.down = Down::default();
         self.initialiser.reset();
         TrackingState::NotInitialized
     }

@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use crate::backend::{Backend, Execution, MapOwner};
 use crate::camera::Camera;
 use crate::config::{Config, DepthSource};
-use crate::detection::{Detection, Detector};
+use crate::detection::{Detection, Detector, mask_of_classes};
 use crate::detector_thread::DetectorThread;
 use crate::dynamic::{DynamicFilter, Evidence, FirstPose};
 use crate::features::{Features, OrbExtractor};
@@ -25,6 +25,7 @@ use crate::map::{KeyFrameId, Map};
 use crate::right_eye::{METRES_PER_UNIT, RightEye};
 use crate::sensor::SensorModel;
 use crate::tracking::{Initialiser, TrackedFrame, Tracker, TrackingState};
+use crate::upright::Down;
 pub use errors::{FrameRejected, SetupError};
 pub use times::StageTimes;
 use times::Stopwatch;
@@ -79,6 +80,7 @@ pub struct Slam {
     extracted: Features,
     tracker: Tracker,
     initialiser: Initialiser,
+    down: Down,
     owner: MapOwner,
     execution: Execution,
     state: TrackingState,
@@ -88,6 +90,8 @@ pub struct Slam {
     /// Indices of the classes that can move.
     movable_classes: Vec<usize>,
     movable: Vec<Detection>,
+    /// Pixels of movable objects, from a detector that segments.
+    movable_mask: Option<Image<u8>>,
     detector_failures: usize,
     /// Frames that were not refused.
     frames_seen: usize,
@@ -140,6 +144,7 @@ impl Slam {
             detector: detector.map(DetectorThread::spawn).transpose()?,
             movable_classes,
             movable: Vec::new(),
+            movable_mask: None,
             detector_failures: 0,
             frames_seen: 0,
             last_timestamp_ns: None,
@@ -162,6 +167,7 @@ impl Slam {
             extracted: Features::default(),
             tracker: Tracker::default(),
             initialiser: Initialiser::default(),
+            down: Down::default(),
             state: TrackingState::NotInitialized,
             anchors: Vec::new(),
         })
@@ -224,7 +230,7 @@ impl Slam {
         let evidence = Evidence {
             movable: &self.movable,
             looked,
-            mask: frame.mask.as_deref(),
+            mask: frame.mask.as_deref().or(self.movable_mask.as_ref()),
             gray: &self.gray,
             depth: &depth,
             sensor: &self.sensor,
@@ -267,6 +273,7 @@ impl Slam {
         self.owner.note(&mut self.tracker.sightings);
         if tracked {
             self.tracker.accept(self.owner.map());
+            self.down.see(&self.tracker.current.t_cam_world);
             if let Some(tie) = self.tracker.current.reference {
                 self.filter.end_frame(&self.config.dynamic, frame.timestamp_ns, tie);
             }
@@ -335,16 +342,30 @@ impl Slam {
     fn start_detector(&mut self, frame: &RgbdFrame) -> bool {
         let due = self.frames_seen.is_multiple_of(self.config.dynamic.detect_every);
         self.frames_seen += 1;
+        let roll_deg = self.roll_deg();
         if let Some(detector) = self.detector.as_mut().filter(|_| due && frame.detections.is_none()) {
-            detector.start(&frame.color);
+            detector.start(&frame.color, roll_deg);
         }
         due
+    }
+
+    /// How far the next picture has to be turned to be upright, degrees, as far as is known before its pose: what
+    /// [`Upright::detect`](crate::Upright::detect) is to be given for boxes that come with the frame.
+    pub fn roll_deg(&self) -> i32 {
+        match self.state {
+            TrackingState::NotInitialized => 0,
+            _ => {
+                let expected = self.tracker.predict(self.owner.map());
+                self.down.roll_deg(&expected, self.config.dynamic.upright_roll_deg)
+            }
+        }
     }
 
     /// Boxes of movable objects for this frame. Returns whether anybody looked for them: not if the detector fails, is late, or none are
     /// due. Tracks carry such frames.
     fn collect_boxes(&mut self, frame: &RgbdFrame, due: bool) -> bool {
         self.movable.clear();
+        self.movable_mask = None;
         if let Some(known) = &frame.detections {
             self.movable.extend(known.iter().filter(|_| due));
             return due;
@@ -354,8 +375,9 @@ impl Slam {
         let waits = !self.config.dynamic.detect_async || self.state == TrackingState::NotInitialized;
         match if waits { detector.finish() } else { detector.poll() } {
             None => false,
-            Some(Ok(boxes)) => {
-                self.movable.extend(boxes.iter().filter(|d| self.movable_classes.contains(&d.class)));
+            Some(Ok(seen)) => {
+                self.movable.extend(seen.boxes.iter().filter(|d| self.movable_classes.contains(&d.class)));
+                self.movable_mask = seen.mask.as_ref().map(|mask| mask_of_classes(mask, &self.movable_classes));
                 true
             }
             Some(Err(error)) => {

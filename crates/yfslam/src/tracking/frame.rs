@@ -113,13 +113,15 @@ impl TrackedFrame {
         }
     }
 
+    /// Its pose, `t_cam_world`, where the map is now.
+    pub fn pose_in(&self, map: &Map) -> Pose {
+        let tied = self.reference.and_then(|(reference, t_cam_reference)| map.tied_pose(reference, &t_cam_reference));
+        tied.unwrap_or(self.t_cam_world)
+    }
+
     /// Brings pose and matched points up to date after the map moved; matches to landmarks that are gone are dropped.
     pub fn follow_map(&mut self, map: &Map) {
-        if let Some((reference, t_cam_reference)) = self.reference
-            && let Some(t_cam_world) = map.tied_pose(reference, &t_cam_reference)
-        {
-            self.t_cam_world = t_cam_world;
-        }
+        self.t_cam_world = self.pose_in(map);
         for sight in &mut self.sights {
             if let Some(Sight { landmark: Some(id), .. }) = *sight {
                 *sight = map.landmark(id).map(|l| Sight { landmark: Some(id), point_world: l.position });

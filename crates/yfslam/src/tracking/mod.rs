@@ -77,9 +77,8 @@ impl Tracker {
     }
 
     /// The constant-velocity prediction of the pose of the current frame, `t_cam_world`.
-    pub fn predict(&mut self, map: &Map) -> Pose {
-        self.last.follow_map(map);
-        self.velocity.unwrap_or_else(Pose::identity) * self.last.t_cam_world
+    pub fn predict(&self, map: &Map) -> Pose {
+        self.velocity.unwrap_or_else(Pose::identity) * self.last.pose_in(map)
     }
 
     /// A first pose from the last frame, else from the reference keyframe. Returns whether one was found.
@@ -95,6 +94,7 @@ impl Tracker {
     fn track_motion(&mut self, sensor: &SensorModel, config: &Config, map: &Map) -> bool {
         let c = &config.tracking;
         let prediction = self.predict(map);
+        self.last.follow_map(map);
         self.last.borrow_depth_points(sensor, c.borrowed_points);
         for factor in [1.0, 2.0] {
             self.current.clear_sights();

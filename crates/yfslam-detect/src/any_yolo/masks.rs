@@ -1,0 +1,54 @@
+//! Masks of a network that segments (Bolya et al., YOLACT, ICCV 2019, section 3.2): each object's is a sum of prototypes that all share,
+//! weighed by the object's own coefficients and cut at its box.
+//!
+//! In: prototypes, coefficients, boxes. Out: the class that each pixel of the image shows.
+
+use yfslam::Detection;
+use yfslam::image::Image;
+
+use super::letterbox::Letterbox;
+
+/// Prototypes `[count, height, width]`, row-major, over the whole network input.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prototypes<'a> {
+    pub(super) values: &'a [f32],
+    pub(super) shape: [usize; 3],
+}
+
+impl Prototypes<'_> {
+    /// Draws the pixels of an object, found in the image that `letterbox` holds, as 1 + its class; those of former objects are kept.
+    /// Objects of classes that a mask cannot tell are left out.
+    pub(super) fn draw(self, coefficients: &[f32], object: &Detection, letterbox: &Letterbox, mask: &mut Image<u8>) {
+        let Ok(value) = u8::try_from(object.class + 1) else { return };
+        let [_, height, width] = self.shape;
+        let stride = [letterbox.size.1 as f32 / width as f32, letterbox.size.0 as f32 / height as f32];
+        let edges = |low: f32, high: f32, side: usize| low.max(0.0).floor() as usize..(high.ceil() as usize).min(side);
+        let bbox = &object.bbox;
+        let (rows, columns) =
+            (edges(bbox.y_min, bbox.y_max, mask.height()), edges(bbox.x_min, bbox.x_max, mask.width()));
+        for row in rows {
+            for column in columns.clone() {
+                let at = letterbox.to_input([column as f32 + 0.5, row as f32 + 0.5]);
+                let inside = self.sum(coefficients, [at[0] / stride[0] - 0.5, at[1] / stride[1] - 0.5]) > 0.0;
+                if let Some(pixel) = mask.row_mut(row).get_mut(column).filter(|pixel| inside && **pixel == 0) {
+                    *pixel = value;
+                }
+            }
+        }
+    }
+
+    /// The weighed sum at a position, px of the prototypes, bilinear; above 0 the object is more likely there than not.
+    fn sum(self, coefficients: &[f32], [x, y]: [f32; 2]) -> f32 {
+        let [_, height, width] = self.shape;
+        let (x, y) = (x.clamp(0.0, width as f32 - 1.0), y.clamp(0.0, height as f32 - 1.0));
+        let (left, top) = (x as usize, y as usize);
+        let (fx, fy) = (x - left as f32, y - top as f32);
+        let (right, bottom) = ((left + 1).min(width - 1), (top + 1).min(height - 1));
+        let planes = self.values.chunks_exact(height * width);
+        let weighed = coefficients.iter().zip(planes).map(|(coefficient, plane)| {
+            let line = |row: usize| plane[row * width + left] * (1.0 - fx) + plane[row * width + right] * fx;
+            coefficient * (line(top) * (1.0 - fy) + line(bottom) * fy)
+        });
+        weighed.sum()
+    }
+}
