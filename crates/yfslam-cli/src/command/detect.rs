@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use yfslam::image::RgbImage;
-use yfslam::{Detection, DetectorError, Upright};
+use yfslam::{Detection, Detector, Upright};
 use yfslam_detect::DetectorConfig;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
@@ -89,8 +89,7 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
     let mut progress = Progress::new(terminal, "detect", files.len());
     let mut upright = Upright::default();
     for (index, file) in files.iter().enumerate() {
-        let mut find = |image: &RgbImage, found: &mut _| upright.detect(&mut *detector, image, args.roll, found);
-        let look = match look(file, &mut find) {
+        let look = match look(file, &mut *detector, &mut upright, args.roll) {
             Ok((image, detections)) => {
                 let of = |d: Detection| Some(FoundBox::new(d, known.get(d.class).map(String::as_str).filter(wanted)?));
                 let boxes: Vec<FoundBox> = detections.into_iter().filter_map(of).collect();
@@ -174,14 +173,16 @@ fn pictures(out: &OutputFolder) -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Reads an image and finds boxes in it.
+/// Reads an image and finds boxes in it, where the camera was rolled by `roll_deg`.
 fn look(
     file: &Path,
-    find: &mut dyn FnMut(&RgbImage, &mut Vec<Detection>) -> Result<(), DetectorError>,
+    detector: &mut dyn Detector,
+    upright: &mut Upright,
+    roll_deg: i32,
 ) -> Result<(RgbImage, Vec<Detection>)> {
     let bytes = std::fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
     let (mut image, mut found) = (RgbImage::default(), Vec::new());
     decode_color(&bytes, None, &mut image).map_err(|error| anyhow!("{} {error}", file.display()))?;
-    find(&image, &mut found).with_context(|| file.display().to_string())?;
+    upright.detect(detector, &image, roll_deg, &mut found).with_context(|| file.display().to_string())?;
     Ok((image, found))
 }
