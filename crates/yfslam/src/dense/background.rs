@@ -202,7 +202,7 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::dense::{DenseConfig, SurveyPiece, scene};
+    use crate::dense::{DenseConfig, scene};
 
     #[test]
     fn a_person_is_replaced_by_the_wall_that_another_view_shows() {
@@ -221,8 +221,7 @@ mod tests {
         }
         own.depth.iter_mut().filter(|d| **d < 3000).for_each(|d| *d |= 1 << 15);
         let pieces = [(Pose::identity(), own.clone()), (moved, other)];
-        let pieces = pieces.map(|(t_world_cam, piece)| SurveyPiece { timestamp_ns: 0, t_world_cam, piece });
-        let survey = Survey { pieces: pieces.into(), grid: grid.clone() };
+        let survey = Survey::of_poses(grid.clone(), pieces);
         let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
         let seen = background(&survey, &volume, &grid, &Pose::identity(), Some(&own), Some(0));
         assert!(seen.valid.data().iter().all(|valid| *valid), "everything is known");

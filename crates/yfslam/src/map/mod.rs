@@ -74,10 +74,16 @@ impl Map {
 
     /// Current `t_cam_world` of a keyframe; for a removed one by way of the ancestor it was tied to.
     pub fn keyframe_pose(&self, id: KeyFrameId) -> Option<Pose> {
+        let (keyframe, t_asked_keyframe) = self.standing(id)?;
+        Some(t_asked_keyframe * keyframe.t_cam_world)
+    }
+
+    /// The keyframe or, if it was removed, the ancestor it was tied to, with `t_asked_found`.
+    pub fn standing(&self, id: KeyFrameId) -> Option<(&KeyFrame, Pose)> {
         let (mut id, mut t_asked_id) = (id, Pose::identity());
         loop {
             if let Some(keyframe) = self.keyframes.get(id) {
-                return Some(t_asked_id * keyframe.t_cam_world);
+                return Some((keyframe, t_asked_id));
             }
             let (ancestor, t_id_ancestor) = self.removed.get(&id)?;
             t_asked_id *= *t_id_ancestor;
