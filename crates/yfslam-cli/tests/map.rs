@@ -7,6 +7,8 @@ mod common;
 mod judge;
 #[path = "../examples/dense/survey.rs"]
 mod survey;
+#[path = "../examples/dense/thickness.rs"]
+mod thickness;
 #[path = "../examples/dense/view.rs"]
 mod view;
 
@@ -16,7 +18,8 @@ use std::process::Command;
 
 use common::{fails, succeeds};
 use judge::{Occupancy, Truth, survey_of_exact_poses};
-use survey::{Taken, take};
+use survey::{Taken, Way, take};
+use thickness::thickness;
 use yfslam::dense::persist::decode;
 use yfslam::dense::{DenseConfig, Survey, SurveyPiece, Volume, up};
 use yfslam::dynamic::Method;
@@ -178,7 +181,8 @@ fn world(spec: &str) -> (World, WorldConfig) {
 
 fn mapped(world: &World, method: Method) -> (Survey, Volume) {
     let config = DenseConfig::default();
-    let Taken { survey, each_ms, bytes } = take(world, method, &config, true).unwrap();
+    let taken = take(world, &[Way { method, loops: true }], &config).unwrap().remove(0);
+    let Taken { survey, each_ms, bytes } = taken;
     println!("{method:?}: {} pieces, {each_ms:.1} ms each", survey.pieces.len());
     assert!(bytes < 20_000_000, "{bytes} bytes");
     let volume = survey.volume(&config, &up::of_survey(&survey), |_| {});
@@ -210,4 +214,20 @@ fn people_who_walk_leave_no_ghosts_and_walls_stand_where_they_are() {
         assert!(views.psnr_db >= 25.0 && views.valid >= 0.85, "{method:?}: {views:?}");
         assert!(views.filled_psnr_db >= 25.0 && views.filled >= 0.5, "{method:?}: {views:?}");
     }
+}
+
+#[test]
+fn after_a_loop_walls_seen_twice_are_as_thin_as_without_drift() {
+    let (world, _) = world("synth:corridor_loop?people=0&frames=440&fps=10&width=320&height=240");
+    let config = DenseConfig::default();
+    let way = |loops| Way { method: Method::None, loops };
+    let taken = take(&world, &[way(true), way(false)], &config).unwrap();
+    let of = |survey: &Survey| thickness(survey, &world, &config);
+    let (closed, open) = (of(&taken[0].survey), of(&taken[1].survey));
+    let exact = of(&survey_of_exact_poses(&taken[0].survey, &world));
+    println!("exact poses {exact:?}\nloop closed {closed:?}\nno loops    {open:?}");
+    assert!(exact.patches > 1000 && open.patches > 1000);
+    // A tenth of a voxel.
+    assert!(exact.mean_m <= closed.mean_m && closed.mean_m < exact.mean_m + 0.1 * f64::from(config.resolution_m));
+    assert!(open.mean_m > 5.0 * closed.mean_m, "without the loop they are double");
 }
