@@ -55,6 +55,7 @@ fn main() -> Result<()> {
         "recall",
         "ghosts",
         "filled",
+        "shown",
         "valid",
         "PSNR (dB)",
         "of filled",
@@ -64,7 +65,6 @@ fn main() -> Result<()> {
     for spec in &arguments.worlds {
         let mut world = parse(spec)?;
         world.detections = true;
-        let config_of_world = world.clone();
         let world = World::new(&world)?;
         let way = |name: &String| -> Result<Way> {
             let method: Method = serde_json::from_value(serde_json::Value::String(name.clone()))?;
@@ -79,7 +79,7 @@ fn main() -> Result<()> {
             let thick = [&survey, &exact].map(|survey| thickness(survey, &world, &config));
             let exact = exact.volume(&config, &up::of_survey(&survey), |_| {});
             let exact = exact.voxels().filter(|known| known.occupied).count();
-            let views = view::judge(&survey, &volume, &config_of_world)?;
+            let views = view::judge(&survey, &volume, &world)?;
             table.push([
                 spec.clone(),
                 name.clone(),
@@ -93,6 +93,7 @@ fn main() -> Result<()> {
                 format!("{:.4}", found.recall),
                 format!("{:.5}", found.ghosts),
                 format!("{:.3}", views.filled),
+                format!("{:.3}", views.shown),
                 format!("{:.3}", views.valid),
                 format!("{:.1}", views.psnr_db),
                 format!("{:.1}", views.filled_psnr_db),
