@@ -5,13 +5,12 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use serde::Serialize;
 use yfslam::dense::cloud::cloud;
-use yfslam::dense::persist::encode;
 use yfslam::dense::{DenseConfig, DenseMapper, Survey, up};
 use yfslam::image::RgbImage;
-use yfslam::{Camera, Execution, RgbdFrame};
+use yfslam::{Camera, Execution, RgbdFrame, Slam};
 use yfslam_eval::report::DenseMap;
 use yfslam_io::write_atomically;
 
@@ -50,17 +49,23 @@ pub struct DenseCost {
 }
 
 impl DenseRun {
-    /// An empty dense map.
+    /// A dense map with the pieces of an earlier session, if there are any, whose map `slam` goes on with.
     ///
     /// # Errors
-    /// For a value of the configuration that cannot work, or if a thread cannot be started.
-    pub fn new(config: &DenseConfig, camera: &Camera, execution: Execution) -> Result<Self> {
-        Ok(Self {
-            mapper: DenseMapper::new(config, camera, execution)?,
-            resets: 0,
-            pieces: 0,
-            cpu: Some(Duration::ZERO),
-        })
+    /// For a value of the configuration that cannot work, if a thread cannot be started, or if the pieces do not fit.
+    pub fn new(
+        config: &DenseConfig,
+        camera: &Camera,
+        execution: Execution,
+        earlier: Option<Survey>,
+        slam: &Slam,
+    ) -> Result<Self> {
+        let mut mapper = DenseMapper::new(config, camera, execution)?;
+        if let Some(earlier) = earlier {
+            mapper =
+                mapper.with_pieces(earlier, slam.map()).context("the dense pieces of the loaded map do not fit")?;
+        }
+        Ok(Self { mapper, resets: 0, pieces: 0, cpu: Some(Duration::ZERO) })
     }
 
     /// Takes note of the frame that the pipeline saw last: if it became a keyframe, its piece is cut, and all pieces follow the map.
@@ -111,13 +116,12 @@ impl DenseRun {
     }
 }
 
-/// Writes the pieces into the output folder.
+/// Writes the pieces, as [`yfslam::dense::persist::encode`] gives them, into the output folder.
 ///
 /// # Errors
 /// The file cannot be written; what stood there stays.
-pub fn write(folder: &Path, survey: &Survey) -> Result<()> {
-    let bytes = encode(survey)?;
-    Ok(write_atomically(&folder.join(DENSE_FILE), |file| file.write_all(&bytes))?)
+pub fn write(folder: &Path, pieces: &[u8]) -> Result<()> {
+    Ok(write_atomically(&folder.join(DENSE_FILE), |file| file.write_all(pieces))?)
 }
 
 /// The map of the pieces, drawn for the report.

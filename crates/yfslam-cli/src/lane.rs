@@ -3,6 +3,7 @@
 //! In: frames, which several lanes may share. Out: a [`Judged`] run, its files written.
 
 use anyhow::Result;
+use yfslam::dense::persist::encode;
 use yfslam::tracking::TrackingState;
 use yfslam::{Config, RgbdFrame, Slam};
 use yfslam_eval::report::{DenseMap, Picture};
@@ -92,11 +93,13 @@ impl Lane {
         let overlay = extras.overlay.then(|| Overlay::prepare(folder.path(), open_score)).transpose()?;
         let moments = extras.moments.map(|count| Moments::new(source.stamps_ns.len(), count, open_score));
         let (detector, times) = detector.map(|d| (d.detector, d.times)).unzip();
+        let earlier = extras.map.pieces(extras.dense)?;
         let slam = extras.map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
         let pipeline = Pipeline::new(slam, times);
+        let (camera, execution) = (&source.camera.camera, extras.map.execution());
         let dense = extras
             .dense
-            .then(|| DenseRun::new(&config.dense, &source.camera.camera, extras.map.execution()))
+            .then(|| DenseRun::new(&config.dense, camera, execution, earlier, pipeline.slam()))
             .transpose()?;
         Ok(Self { config, folder, pipeline, overlay, moments, dense, state: TrackingState::default(), failure: None })
     }
@@ -141,9 +144,10 @@ impl Lane {
         if let Some(failure) = failure {
             return Err(failure);
         }
-        map.save(&mut pipeline)?;
         let dense_cost = dense.as_ref().map(DenseRun::cost);
         let survey = dense.map(|dense| dense.finish(&mut pipeline));
+        let pieces = survey.as_ref().map(encode).transpose()?;
+        map.save(&mut pipeline, pieces.as_deref())?;
         let mut outcome = pipeline.finish(&config)?;
         let mut shared = judge_by.reading.clone();
         let needs_boxes = config.dynamic.method.needs_boxes();
@@ -160,8 +164,8 @@ impl Lane {
             judge(&truth.poses, &to_eval(&outcome.trajectory), options)
         });
         folder.write(&outcome, &config)?;
-        if let Some(survey) = &survey {
-            dense::write(folder.path(), survey)?;
+        if let Some(pieces) = &pieces {
+            dense::write(folder.path(), pieces)?;
         }
         let shown = survey.filter(|_| moments.is_some());
         let dense = shown.map(|survey| dense::pictures(&config.dense, &survey)).transpose()?;

@@ -2,9 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
-use yfslam::map::persist::{SavedMap, decode};
+use yfslam::dense::Survey;
+use yfslam::dense::persist::decode as decode_pieces;
+use yfslam::map::persist::decode;
+use yfslam::packed::PIECES;
 use yfslam::{Execution, MapUse, Slam};
 use yfslam_io::write_atomically;
 
@@ -20,7 +23,7 @@ pub struct MapArgs {
     /// Leave the loaded map as it is, and find the camera in it.
     #[arg(long, requires = "load_map", conflicts_with = "save_map")]
     pub localise: bool,
-    /// Write the map, for --load-map. The file is written whole or not at all.
+    /// Write the map, for --load-map and, with --dense, for `yfslam map`. The file is written whole or not at all.
     #[arg(long, value_name = "FILE")]
     pub save_map: Option<PathBuf>,
     /// Map on a thread of its own, as for a live camera: tracking never waits. Results then differ from run to run.
@@ -52,7 +55,8 @@ impl MapArgs {
         let slam = slam.with_execution(self.execution())?;
         let Some(path) = &self.load_map else { return Ok(slam) };
         let map_use = if self.localise { MapUse::Localise } else { MapUse::Extend };
-        slam.with_map(read(path)?, map_use).with_context(|| format!("the map {} does not fit", path.display()))
+        let saved = decode(&read(path)?).with_context(|| format!("{} cannot be used as a map", path.display()))?;
+        slam.with_map(saved, map_use).with_context(|| format!("the map {} does not fit", path.display()))
     }
 
     /// Proves before a long run that the map can be written after it.
@@ -72,18 +76,39 @@ impl MapArgs {
         Ok(())
     }
 
-    /// Writes the map if that was asked for.
+    /// Writes the map if that was asked for, behind the dense pieces, if there are any.
     ///
     /// # Errors
     /// The file cannot be written; what stood there stays.
-    pub fn save(&self, pipeline: &mut Pipeline) -> Result<()> {
+    pub fn save(&self, pipeline: &mut Pipeline, pieces: Option<&[u8]>) -> Result<()> {
         let Some(path) = &self.save_map else { return Ok(()) };
         let map = pipeline.save_map()?;
-        Ok(write_atomically(path, |file| file.write_all(&map))?)
+        Ok(write_atomically(path, |file| {
+            file.write_all(pieces.unwrap_or_default()).and_then(|()| file.write_all(&map))
+        })?)
+    }
+
+    /// The dense pieces of the map that is extended, if it has any and this run makes more.
+    ///
+    /// # Errors
+    /// The map cannot be read, or is to be saved by a run that would leave them out.
+    pub fn pieces(&self, dense: bool) -> Result<Option<Survey>> {
+        let Some(path) = self.load_map.as_ref().filter(|_| !self.localise && (dense || self.save_map.is_some())) else {
+            return Ok(None);
+        };
+        let bytes = read(path)?;
+        if !PIECES.begins(&bytes) {
+            return Ok(None);
+        }
+        ensure!(
+            dense,
+            "{} holds dense pieces, which only a run with --dense carries on; add --dense, or leave out --save-map",
+            path.display()
+        );
+        decode_pieces(&bytes).map(Some).with_context(|| format!("{} cannot be used as a map", path.display()))
     }
 }
 
-fn read(path: &Path) -> Result<SavedMap> {
-    let bytes = std::fs::read(path).with_context(|| format!("the map {} cannot be read", path.display()))?;
-    decode(&bytes).with_context(|| format!("{} cannot be used as a map", path.display()))
+fn read(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).with_context(|| format!("the map {} cannot be read", path.display()))
 }

@@ -4,7 +4,8 @@
 //! kind · version u16 · length of the rest u64 · CRC-32 of the rest u32 │ zstd(postcard(records))
 //! ```
 //!
-//! Numbers of the header are little-endian. In: records. Out: bytes, and back, checked. Nothing here touches files.
+//! Numbers of the header are little-endian. One kind may follow another: what `yfslam run --dense --save-map` writes is [`PIECES`], then
+//! [`MAP`]. In: records. Out: bytes, and back, checked. Nothing here touches files.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -17,6 +18,11 @@ pub struct Kind {
     /// The only version that is read.
     pub version: u16,
 }
+
+/// Keyframes and landmarks, by which a camera finds where it is.
+pub const MAP: Kind = Kind { magic: "yfslam map", version: 1 };
+/// Pieces of a dense map, of which products are made.
+pub const PIECES: Kind = Kind { magic: "yfslam dense map", version: 2 };
 
 /// Why bytes cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -52,6 +58,11 @@ pub enum PackedError {
         /// Checksum in the header.
         announced: u32,
     },
+    /// A map without a dense one.
+    #[error(
+        "it is a map to find a camera by, without surfaces: save it by a run with --dense, or give the output folder of such a run"
+    )]
+    NoPieces,
     /// The records contradict each other, or themselves.
     #[error("its records are wrong: {0}")]
     Records(String),
@@ -79,32 +90,71 @@ impl Kind {
         Ok(bytes)
     }
 
-    /// The records in `bytes`.
+    /// Whether bytes begin like this kind.
+    pub fn begins(self, bytes: &[u8]) -> bool {
+        bytes.starts_with(self.magic.as_bytes())
+    }
+
+    /// What of `bytes` is of this kind, still packed and without its header, and what comes after it.
     ///
     /// # Errors
-    /// If the bytes are of another kind or version, cut, altered, or no records.
-    pub fn unpack<T: DeserializeOwned>(self, bytes: &[u8]) -> Result<T, PackedError> {
+    /// If the bytes are of another kind or version, cut, or altered.
+    pub fn split(self, bytes: &[u8]) -> Result<(Packed<'_>, &[u8]), PackedError> {
         let rest = bytes.strip_prefix(self.magic.as_bytes()).ok_or(PackedError::Foreign(self.magic))?;
-        let cut = || PackedError::Length { found: bytes.len() as u64, announced: self.header() as u64 };
-        let (version, rest) = rest.split_first_chunk::<2>().ok_or_else(cut)?;
+        let cut = |announced: u64| PackedError::Length { found: bytes.len() as u64, announced };
+        let header = self.header() as u64;
+        let (version, rest) = rest.split_first_chunk::<2>().ok_or_else(|| cut(header))?;
         let found = u16::from_le_bytes(*version);
         if found != self.version {
             return Err(PackedError::Version { magic: self.magic, found, version: self.version });
         }
-        let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(cut)?;
-        let (checksum, packed) = rest.split_first_chunk::<4>().ok_or_else(cut)?;
+        let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(|| cut(header))?;
+        let (checksum, rest) = rest.split_first_chunk::<4>().ok_or_else(|| cut(header))?;
         let (length, announced) = (u64::from_le_bytes(*length), u32::from_le_bytes(*checksum));
-        if packed.len() as u64 != length {
-            let announced = length.saturating_add(self.header() as u64);
-            return Err(PackedError::Length { found: bytes.len() as u64, announced });
-        }
+        let at = usize::try_from(length).ok().and_then(|length| rest.split_at_checked(length));
+        let (packed, rest) = at.ok_or_else(|| cut(length.saturating_add(header)))?;
         let found = crc32fast::hash(packed);
         if found != announced {
             return Err(PackedError::Checksum { found, announced });
         }
+        Ok((Packed(packed), rest))
+    }
+
+    /// The same of `bytes` that hold nothing else.
+    ///
+    /// # Errors
+    /// If the bytes are of another kind or version, cut, appended to, or altered.
+    pub fn whole(self, bytes: &[u8]) -> Result<Packed<'_>, PackedError> {
+        let (packed, rest) = self.split(bytes)?;
+        if rest.is_empty() {
+            return Ok(packed);
+        }
+        let found = bytes.len() as u64;
+        Err(PackedError::Length { found, announced: found - rest.len() as u64 })
+    }
+
+    /// The records in `bytes` that hold nothing else.
+    ///
+    /// # Errors
+    /// As [`Kind::whole`], or if they are no records.
+    pub fn unpack<T: DeserializeOwned>(self, bytes: &[u8]) -> Result<T, PackedError> {
+        self.whole(bytes)?.unpack()
+    }
+}
+
+/// Records as they were packed, checksum proved.
+#[derive(Clone, Copy, Debug)]
+pub struct Packed<'a>(&'a [u8]);
+
+impl Packed<'_> {
+    /// The records.
+    ///
+    /// # Errors
+    /// If they are none.
+    pub fn unpack<T: DeserializeOwned>(self) -> Result<T, PackedError> {
         let wrong = |error: &dyn std::fmt::Display| PackedError::Records(error.to_string());
         let mut plain = Vec::new();
-        let mut decoder = ruzstd::decoding::StreamingDecoder::new(packed).map_err(|e| wrong(&e))?;
+        let mut decoder = ruzstd::decoding::StreamingDecoder::new(self.0).map_err(|e| wrong(&e))?;
         std::io::Read::read_to_end(&mut decoder, &mut plain).map_err(|e| wrong(&e))?;
         postcard::from_bytes(&plain).map_err(|e| wrong(&e))
     }

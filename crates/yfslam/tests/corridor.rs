@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use yfslam::Camera;
 use yfslam::dense::voxels::voxel_at;
-use yfslam::dense::{CellGrid, DenseConfig, Piece, Survey, SurveyPiece, Volume};
+use yfslam::dense::{CellGrid, DenseConfig, Piece, Survey, Volume};
 
 /// Half the width of the corridor, and how far floor and ceiling are from the camera, m.
 const WALL_M: f32 = 1.2;
@@ -37,15 +37,12 @@ fn a_corridor_of_100_m_fits_into_300_mb() {
     let grid = CellGrid::new(&camera, config.stride_px);
     // The camera looks ahead, a little to the left, a little to the right, in turn.
     let angle = |k: usize| [0.0, 0.35, 0.0, -0.35][k % 4];
-    let piece = |k: usize| SurveyPiece {
-        timestamp_ns: k as i64,
-        t_world_cam: Isometry3::new(
-            Vector3::new(0.0, 0.0, f64::from(STEP_M) * k as f64),
-            Vector3::y() * f64::from(angle(k)),
-        ),
-        piece: Piece::of_depths(grid.rays().iter().map(|ray| depth_m(*ray, angle(k))), [128; 3]),
+    let piece = |k: usize| {
+        let way = Vector3::new(0.0, 0.0, f64::from(STEP_M) * k as f64);
+        let depths_m = grid.rays().iter().map(|ray| depth_m(*ray, angle(k)));
+        (Isometry3::new(way, Vector3::y() * f64::from(angle(k))), Piece::of_depths(depths_m, [128; 3]))
     };
-    let survey = Survey { pieces: (0..(100.0 / STEP_M) as usize).map(piece).collect(), grid: grid.clone() };
+    let survey = Survey::of_poses(grid.clone(), (0..(100.0 / STEP_M) as usize).map(piece));
     let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
     let megabytes = |bytes: usize| bytes as f64 / 1e6;
     let (pieces, voxels) = (megabytes(survey.bytes()), megabytes(volume.bytes()));

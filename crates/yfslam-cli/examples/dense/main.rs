@@ -7,12 +7,14 @@
 
 mod judge;
 mod survey;
+mod thickness;
 mod view;
 
 use anyhow::Result;
 use clap::Parser;
 use judge::{Truth, survey_of_exact_poses};
-use survey::{Taken, take};
+use survey::{Taken, Way, take};
+use thickness::thickness;
 use yfslam::dense::{DenseConfig, up};
 use yfslam::dynamic::Method;
 use yfslam_eval::{Table, TableStyle};
@@ -46,10 +48,14 @@ fn main() -> Result<()> {
         "pieces",
         "occupied",
         "of exact poses",
+        "patches",
+        "thick (cm)",
+        "of exact (cm)",
         "precision",
         "recall",
         "ghosts",
         "filled",
+        "shown",
         "valid",
         "PSNR (dB)",
         "of filled",
@@ -59,26 +65,35 @@ fn main() -> Result<()> {
     for spec in &arguments.worlds {
         let mut world = parse(spec)?;
         world.detections = true;
-        let config_of_world = world.clone();
         let world = World::new(&world)?;
-        for name in &arguments.methods {
+        let way = |name: &String| -> Result<Way> {
             let method: Method = serde_json::from_value(serde_json::Value::String(name.clone()))?;
-            let Taken { survey, each_ms, bytes } = take(&world, method, &config, !arguments.no_loops)?;
+            Ok(Way { method, loops: !arguments.no_loops })
+        };
+        let ways = arguments.methods.iter().map(way).collect::<Result<Vec<_>>>()?;
+        for (name, taken) in arguments.methods.iter().zip(take(&world, &ways, &config)?) {
+            let Taken { survey, each_ms, bytes } = taken;
             let volume = survey.volume(&config, &up::of_survey(&survey), |_| {});
             let found = Truth::of(&survey, &volume, &world).judge(&volume);
-            let exact = survey_of_exact_poses(&survey, &world).volume(&config, &up::of_survey(&survey), |_| {});
+            let exact = survey_of_exact_poses(&survey, &world);
+            let thick = [&survey, &exact].map(|survey| thickness(survey, &world, &config));
+            let exact = exact.volume(&config, &up::of_survey(&survey), |_| {});
             let exact = exact.voxels().filter(|known| known.occupied).count();
-            let views = view::judge(&survey, &volume, &config_of_world)?;
+            let views = view::judge(&survey, &volume, &world)?;
             table.push([
                 spec.clone(),
                 name.clone(),
                 survey.pieces.len().to_string(),
                 found.occupied.to_string(),
                 format!("{:.3}", found.occupied as f64 / exact.max(1) as f64),
+                thick[0].patches.to_string(),
+                format!("{:.2}", 100.0 * thick[0].mean_m),
+                format!("{:.2}", 100.0 * thick[1].mean_m),
                 format!("{:.4}", found.precision),
                 format!("{:.4}", found.recall),
                 format!("{:.5}", found.ghosts),
                 format!("{:.3}", views.filled),
+                format!("{:.3}", views.shown),
                 format!("{:.3}", views.valid),
                 format!("{:.1}", views.psnr_db),
                 format!("{:.1}", views.filled_psnr_db),

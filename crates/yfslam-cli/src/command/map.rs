@@ -13,7 +13,6 @@ use yfslam::dense::mesh::mesh;
 use yfslam::dense::persist::decode;
 use yfslam::dense::{DenseConfig, Survey, Volume, up};
 use yfslam::image::{Image, RgbImage};
-use yfslam::map::persist::is_saved_map;
 use yfslam_io::write::{
     OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png, write_nav2, write_octomap,
     write_pcd, write_ply, write_ply_mesh,
@@ -31,7 +30,8 @@ Examples:
   yfslam run rgbd_bonn_crowd --camera bonn --dense
   yfslam map yfslam-out/rgbd_bonn_crowd                              all products
   yfslam map yfslam-out/rgbd_bonn_crowd --octomap --grid --resolution 0.1
-  yfslam map dense.map --cloud --out clouds --up 0,-1,0
+  yfslam run DIR --dense --save-map lab.map
+  yfslam map lab.map --cloud --out clouds --up 0,-1,0
 
 In the output folder:
   cloud.ply, cloud.pcd      with --cloud, coloured points, one a voxel
@@ -55,8 +55,8 @@ const PICTURE_PX: [usize; 2] = [900, 600];
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct DenseMapArgs {
-    /// The output folder of a run with --dense, or its `dense.map`.
-    #[arg(value_name = "RUN")]
+    /// The output folder of a run with --dense, its `dense.map`, or the map that it saved (--save-map).
+    #[arg(value_name = "RUN|MAP")]
     run: PathBuf,
     /// Coloured point cloud.
     #[arg(long, help_heading = "Products")]
@@ -92,7 +92,7 @@ pub struct DenseMapArgs {
     /// Height of the floor along the up direction, m, the first camera's being 0 [default: as the map shows it].
     #[arg(long, value_name = "M", allow_negative_numbers = true, help_heading = "Map")]
     floor: Option<f32>,
-    /// Where the files go [default: `map` beside `dense.map`].
+    /// Where the files go [default: `map` in the output folder, or beside the map].
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: Option<PathBuf>,
 }
@@ -197,11 +197,6 @@ impl DenseMapArgs {
         let bytes = std::fs::read(&file).with_context(|| {
             format!("cannot read {}; make it with `yfslam run SEQUENCE --dense`, or check the path", file.display())
         })?;
-        ensure!(
-            !is_saved_map(&bytes),
-            "{} is a map from --save-map: it holds landmarks to find a camera by, no surfaces; give the folder of a run with --dense",
-            file.display()
-        );
         let survey = decode(&bytes).with_context(|| format!("{} cannot be used", file.display()))?;
         ensure!(!survey.pieces.is_empty(), "{} holds no keyframe: the run tracked nothing", file.display());
         let beside = || file.parent().unwrap_or(Path::new(".")).join("map");
@@ -266,7 +261,7 @@ impl Maker<'_> {
 
     /// Views of some keyframes without people, those in which most moves.
     fn background(&self) -> Result<String> {
-        let Survey { grid, pieces } = self.survey;
+        let Survey { grid, pieces, .. } = self.survey;
         let cells = grid.rays().len();
         let moving = |number: usize| (0..cells).filter(|cell| pieces[number].piece.moves(*cell)).count();
         let mut fullest: Vec<(usize, usize)> = (0..pieces.len()).map(|number| (moving(number), number)).collect();

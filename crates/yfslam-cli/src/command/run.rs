@@ -34,6 +34,7 @@ Examples:
   yfslam run DIR --start 100 --end 400 --reverse --overlay --report
   yfslam run DIR --save-map lab.map                    then, another day:
   yfslam run OTHER --load-map lab.map --localise
+  yfslam run DIR --dense --save-map lab.map            with surfaces, for `yfslam map lab.map`
   yfslam run DIR --masks DIR/masks                     what can move, from a segmentation of your own
   yfslam run DIR --sensor mono                         one picture a frame, no depth
   yfslam run DIR --detect-every 3                      the network looks at every third frame

@@ -3,6 +3,10 @@
 //! In: a survey with its volume, and a view. Out: its picture, with the pixels that nobody has seen left out. DynaSLAM (IEEE RA-L 2018,
 //! section III-E) projects earlier frames into the view. Here depth is projected, and colour looked up at that depth in the frames that
 //! are nearest: it stays sharp, and one of them that still shows somebody is outvoted.
+//!
+//! What moves is outlined generously, for no part of it may become a surface. Where nothing surer is known, a cell within an outline is
+//! believed if its reading ends on a surface of the map, which other views have made, or goes on with one: it shows what stands beside
+//! somebody.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -19,6 +23,8 @@ const VOTES: usize = 7;
 /// Difference in depth up to which a frame sees the same surface, as a share of it, and m at least.
 const SAME_SHARE: f32 = 0.04;
 const SAME_M: f32 = 0.04;
+/// Share of a likely colour that has to come from cells that show the surface.
+const LIKELY_SHARE: f32 = 0.25;
 
 /// Every so many cells light is compared, and so many must be seen by both.
 const LIGHT_STEP: usize = 37;
@@ -35,30 +41,44 @@ pub struct Background {
     pub valid: Image<bool>,
 }
 
+/// How sure an answer has to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Sureness {
+    /// Nothing moves there, and all around is the same surface.
+    Sure,
+    /// Nothing moves there, or what is said to move is where the map has a surface.
+    Likely,
+}
+
 /// A piece that is asked.
-struct Source {
+struct Source<'a> {
     /// How far its view is from the one wanted.
     apart: f64,
-    number: usize,
+    piece: &'a Piece,
+    grid: &'a CellGrid,
+    volume: &'a Volume,
     t_view_source: Isometry3<f32>,
+    t_map_source: Isometry3<f32>,
     /// What its colours are multiplied by: exposure changes from frame to frame.
     gain: Vector3<f32>,
 }
 
-impl Source {
+impl Source<'_> {
     /// The colour that it has for a point of the view.
-    fn look(&self, survey: &Survey, point: &Point3<f32>) -> Option<Vector3<f32>> {
-        let one = survey.pieces.get(self.number)?;
+    fn look(&self, point: &Point3<f32>, sureness: Sureness) -> Option<Vector3<f32>> {
         let p = self.t_view_source.inverse_transform_point(point);
-        look(&survey.grid, &one.piece, survey.grid.project(&p)?, p.z)
+        let at = self.grid.project(&p)?;
+        look(self.grid, self.piece, at, p.z, sureness, |cell| {
+            stands(self.volume, &self.t_map_source, self.grid, self.piece, cell).is_some()
+        })
     }
 
     /// Brings its light to that of the view's own piece, by what both see.
-    fn match_light(&mut self, survey: &Survey, grid: &CellGrid, own: &Piece) {
+    fn match_light(&mut self, grid: &CellGrid, own: &Piece) {
         let (mut ours, mut theirs, mut count) = (Vector3::zeros(), Vector3::zeros(), 0);
         for (cell, [x, y]) in grid.rays().iter().enumerate().step_by(LIGHT_STEP) {
             let Some(z) = own.surface_m(cell) else { continue };
-            if let Some(color) = self.look(survey, &Point3::new(x * z, y * z, z)) {
+            if let Some(color) = self.look(&Point3::new(x * z, y * z, z), Sureness::Sure) {
                 ours += Vector3::from(own.color(cell).map(f32::from));
                 theirs += color;
                 count += 1;
@@ -82,15 +102,27 @@ pub fn background(
 ) -> Background {
     let mut sources: Vec<Source> = Vec::new();
     for (number, one) in survey.pieces.iter().enumerate().filter(|(number, _)| Some(*number) != except) {
+        let Some(t_map_source) = volume.pose(number) else { continue };
         let t_view_source = t_world_cam.inverse() * one.t_world_cam;
-        let apart = t_view_source.translation.vector.norm() + 2.0 * t_view_source.rotation.angle();
-        sources.push(Source { apart, number, t_view_source: t_view_source.cast(), gain: Vector3::repeat(1.0) });
+        sources.push(Source {
+            apart: t_view_source.translation.vector.norm() + 2.0 * t_view_source.rotation.angle(),
+            piece: &one.piece,
+            grid: &survey.grid,
+            volume,
+            t_view_source: t_view_source.cast(),
+            t_map_source: t_map_source.cast(),
+            gain: Vector3::repeat(1.0),
+        });
     }
     sources.sort_by(|a, b| a.apart.total_cmp(&b.apart));
     if let Some(own) = own {
-        sources.iter_mut().take(SOURCES).for_each(|source| source.match_light(survey, grid, own));
+        sources.iter_mut().take(SOURCES).for_each(|source| source.match_light(grid, own));
     }
-    let mut depth_m = projected_depth(survey, volume, grid, &sources);
+    let t_map_view = sources.first().map(|source| source.t_map_source * source.t_view_source.inverse());
+    let own_beside = |cell| stands(volume, t_map_view.as_ref()?, grid, own?, cell);
+    let nowhere = vec![0.0; grid.columns() * grid.rows()];
+    let sure_m = projected_depth(grid, &sources, Sureness::Sure, &nowhere);
+    let mut depth_m = projected_depth(grid, &sources, Sureness::Likely, &sure_m);
     let mut color = RgbImage::new(grid.columns(), grid.rows());
     let mut valid = Image::new(grid.columns(), grid.rows());
     for (cell, (z, &[x, y])) in depth_m.iter_mut().zip(grid.rays()).enumerate() {
@@ -98,11 +130,13 @@ pub fn background(
         if let Some(own_m) = kept.and_then(|own| own.surface_m(cell)) {
             *z = own_m;
         }
-        let known = match kept {
-            Some(own) => Some(own.color(cell)),
-            None if *z > 0.0 => vote(survey, &sources, &Point3::new(x * *z, y * *z, *z)),
-            None => None,
-        };
+        let asked =
+            |z: f32, sureness| (z > 0.0).then(|| vote(&sources, &Point3::new(x * z, y * z, z), sureness)).flatten();
+        let known = kept.map(|own| own.color(cell)).or_else(|| asked(*z, Sureness::Sure)).or_else(|| {
+            let Some((own, own_m)) = own.zip(own_beside(cell)) else { return asked(*z, Sureness::Likely) };
+            *z = own_m;
+            Some(own.color(cell))
+        });
         if let Some(known) = known {
             color.data_mut()[cell] = known;
             valid.data_mut()[cell] = true;
@@ -112,35 +146,59 @@ pub fn background(
     Background { color, depth_m, valid }
 }
 
-/// Depth of the nearest static surface in each cell, m; 0 where there is none. Of what is in its range, only
-/// what the volume has as occupied counts.
-fn projected_depth(survey: &Survey, volume: &Volume, grid: &CellGrid, sources: &[Source]) -> Vec<f32> {
+/// Depth of what a cell shows, m, if the map has a surface there, or one next to it and nobody has seen through the place itself.
+fn stands(volume: &Volume, t_map_cam: &Isometry3<f32>, grid: &CellGrid, piece: &Piece, cell: usize) -> Option<f32> {
     let config = volume.config();
-    let per_m = 1.0 / config.resolution_m;
+    let z = piece.reading(cell)?.depth_m;
+    // Far away the volume says nothing.
+    if z > config.max_range_m {
+        return None;
+    }
+    let [x, y] = grid.rays()[cell];
+    let at @ [i, j, k] = voxel_at(&(t_map_cam * Point3::new(x * z, y * z, z)), 1.0 / config.resolution_m);
+    let beside = |n: i32| volume.is_occupied([i + n % 3 - 1, j + n / 3 % 3 - 1, k + n / 9 - 1]);
+    let holds = volume.get(at).map_or_else(|| (0..27).any(beside), |known| known.occupied);
+    holds.then_some(z)
+}
+
+/// Depth of the nearest static surface in each cell, m; 0 where there is none. It stays where it is `known`. Of what is in its range,
+/// only what the volume has as occupied counts.
+fn projected_depth(grid: &CellGrid, sources: &[Source], sureness: Sureness, known: &[f32]) -> Vec<f32> {
     let (columns, rows) = (grid.columns() as i32, grid.rows() as i32);
-    let mut depth_m = vec![0.0f32; grid.columns() * grid.rows()];
-    for Source { number, t_view_source, .. } in sources {
-        let (Some(one), Some(pose)) = (survey.pieces.get(*number), volume.pose(*number)) else { continue };
-        let pose: Isometry3<f32> = pose.cast();
-        for (p, _) in one.piece.points(&survey.grid, f32::INFINITY) {
+    let mut depth_m = known.to_vec();
+    for source in sources {
+        let Source { piece, volume, t_view_source, t_map_source, .. } = source;
+        let config = volume.config();
+        for (cell, [x, y]) in source.grid.rays().iter().enumerate() {
+            let likely = sureness == Sureness::Likely;
+            let Some(reading) = piece.reading(cell).filter(|reading| reading.moves == likely) else { continue };
+            let z = reading.depth_m;
+            let p = Point3::new(x * z, y * z, z);
             let seen = t_view_source * p;
             let Some([column, row]) = grid.project(&seen) else { continue };
-            // Far away the volume says nothing.
-            if p.z <= config.max_range_m && !volume.is_occupied(voxel_at(&(pose * p), per_m)) {
-                continue;
-            }
+            let holds = || match sureness {
+                Sureness::Likely => stands(volume, t_map_source, source.grid, piece, cell).is_some(),
+                // Far away the volume says nothing.
+                Sureness::Sure => {
+                    z > config.max_range_m
+                        || volume.is_occupied(voxel_at(&(t_map_source * p), 1.0 / config.resolution_m))
+                }
+            };
             // A cell of the source covers this many of the view.
-            let scale = p.z / seen.z * survey.grid.stride_px() as f32 / grid.stride_px() as f32;
+            let scale = p.z / seen.z * source.grid.stride_px() as f32 / grid.stride_px() as f32;
             let reach = (0.5 * scale + 0.6).clamp(0.6, 4.0);
             let range =
                 |at: f32, end: i32| ((at - reach).ceil().max(0.0) as i32, ((at + reach).floor() as i32).min(end - 1));
             let ((left, right), (top, bottom)) = (range(column, columns), range(row, rows));
-            for r in top..=bottom {
-                for c in left..=right {
-                    let nearest = &mut depth_m[(r * columns + c) as usize];
-                    if *nearest == 0.0 || seen.z < *nearest {
-                        *nearest = seen.z;
-                    }
+            let covered = (top..=bottom).flat_map(|r| (left..=right).map(move |c| (r * columns + c) as usize));
+            let open = |cell: &usize| known[*cell] == 0.0;
+            if !covered.clone().any(|cell| open(&cell)) || !holds() {
+                continue;
+            }
+            for cell in covered.filter(open) {
+                let nearest = &mut depth_m[cell];
+                if *nearest == 0.0 || seen.z < *nearest {
+                    *nearest = seen.z;
                 }
             }
         }
@@ -149,10 +207,10 @@ fn projected_depth(survey: &Survey, volume: &Volume, grid: &CellGrid, sources: &
 }
 
 /// Median colour that the nearest sources give a point of the view, channel by channel.
-fn vote(survey: &Survey, sources: &[Source], point: &Point3<f32>) -> Option<[u8; 3]> {
+fn vote(sources: &[Source], point: &Point3<f32>, sureness: Sureness) -> Option<[u8; 3]> {
     let mut votes: Vec<[u8; 3]> = Vec::with_capacity(VOTES);
     for source in sources.iter().take(SOURCES) {
-        let color = source.look(survey, point).map(|color| color.component_mul(&source.gain));
+        let color = source.look(point, sureness).map(|color| color.component_mul(&source.gain));
         votes.extend(color.map(|color| color.data.0[0].map(|v| (v + 0.5) as u8)));
         if votes.len() == VOTES {
             break;
@@ -167,8 +225,16 @@ fn vote(survey: &Survey, sources: &[Source], point: &Point3<f32>) -> Option<[u8;
     }))
 }
 
-/// The colour of a piece at a position, between its cells; `None` if another surface or something that moves is there.
-fn look(grid: &CellGrid, piece: &Piece, [column, row]: [f32; 2], z: f32) -> Option<Vector3<f32>> {
+/// The colour of a piece at a position, between its cells; `None` if another surface or something that moves is there. If that is
+/// asked for what is likely, such cells are left out, and those that `stands` says show the map are not.
+fn look(
+    grid: &CellGrid,
+    piece: &Piece,
+    [column, row]: [f32; 2],
+    z: f32,
+    sureness: Sureness,
+    stands: impl Fn(usize) -> bool,
+) -> Option<Vector3<f32>> {
     let (left, top) = (column.floor(), row.floor());
     let (dx, dy) = (column - left, row - top);
     let (mut sum, mut weights, mut same) = (Vector3::<f32>::zeros(), 0.0, false);
@@ -183,18 +249,21 @@ fn look(grid: &CellGrid, piece: &Piece, [column, row]: [f32; 2], z: f32) -> Opti
             continue;
         }
         let cell = r as usize * grid.columns() + c as usize;
-        if piece.moves(cell) {
+        let depth = piece.reading(cell).map(|reading| reading.depth_m);
+        let other = depth.is_some_and(|depth| (depth - z).abs() > SAME_M + SAME_SHARE * z);
+        let likely = sureness == Sureness::Likely;
+        if other || piece.moves(cell) && !(likely && stands(cell)) {
+            if likely {
+                continue;
+            }
             return None;
         }
-        match piece.surface_m(cell) {
-            Some(depth) if (depth - z).abs() > SAME_M + SAME_SHARE * z => return None,
-            Some(_) => same = true,
-            None => {}
-        }
+        same |= depth.is_some();
         sum += Vector3::from(piece.color(cell).map(f32::from)) * weight;
         weights += weight;
     }
-    (same && weights > 0.0).then(|| sum / weights)
+    let least = if sureness == Sureness::Likely { LIKELY_SHARE } else { 0.0 };
+    (same && weights > least).then(|| sum / weights)
 }
 
 #[cfg(test)]
@@ -202,7 +271,33 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::dense::{DenseConfig, SurveyPiece, scene};
+    use crate::dense::{DenseConfig, scene};
+
+    #[test]
+    fn what_an_outline_wrongly_covers_is_believed_as_far_as_it_goes_on_with_the_map() {
+        let config = DenseConfig::default();
+        let grid = CellGrid::new(&scene::camera(), config.stride_px);
+        // In the view itself somebody hides all; in the other one half of the wall is marked, and somebody stands before its other half.
+        let own = scene::wall(&grid, 1.0, None);
+        let (mut marked, mut other) = (own.clone(), scene::wall(&grid, 3.01, None));
+        marked.depth.iter_mut().for_each(|d| *d |= 1 << 15);
+        let (columns, half) = (grid.columns(), grid.columns() / 2);
+        for (cell, depth) in other.depth.iter_mut().enumerate() {
+            match (cell % columns, cell / columns) {
+                (column, _) if column >= half => *depth |= 1 << 15,
+                (column, row) if column < 9 && row < 9 => *depth = 2000 | 1 << 15,
+                _ => {}
+            }
+        }
+        let survey = Survey::of_poses(grid.clone(), [(Pose::identity(), marked.clone()), (Pose::identity(), other)]);
+        let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let seen = background(&survey, &volume, &grid, &Pose::identity(), Some(&marked), Some(0));
+        let known = |column: usize, row: usize| seen.valid.data()[row * columns + column];
+        assert!(known(half - 1, 30) && known(half, 30), "a voxel is as wide as a cell");
+        assert!(!known(half + 4, 30), "further on the map says nothing");
+        assert!(!known(4, 4), "somebody in the way stays out");
+        assert!(seen.depth_m.data().iter().all(|z| *z == 0.0 || (z - 3.01).abs() < 0.01));
+    }
 
     #[test]
     fn a_person_is_replaced_by_the_wall_that_another_view_shows() {
@@ -221,8 +316,7 @@ mod tests {
         }
         own.depth.iter_mut().filter(|d| **d < 3000).for_each(|d| *d |= 1 << 15);
         let pieces = [(Pose::identity(), own.clone()), (moved, other)];
-        let pieces = pieces.map(|(t_world_cam, piece)| SurveyPiece { timestamp_ns: 0, t_world_cam, piece });
-        let survey = Survey { pieces: pieces.into(), grid: grid.clone() };
+        let survey = Survey::of_poses(grid.clone(), pieces);
         let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
         let seen = background(&survey, &volume, &grid, &Pose::identity(), Some(&own), Some(0));
         assert!(seen.valid.data().iter().all(|valid| *valid), "everything is known");

@@ -88,7 +88,7 @@ mod tests {
 
     use super::*;
     use crate::dense::piece::CellGrid;
-    use crate::dense::{DenseConfig, SurveyPiece, scene};
+    use crate::dense::{DenseConfig, scene};
     use crate::geometry::Pose;
 
     #[test]
@@ -96,8 +96,7 @@ mod tests {
         let config = DenseConfig::default();
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
         let piece = scene::wall(&grid, 2.01, None);
-        let piece = SurveyPiece { timestamp_ns: 0, t_world_cam: Pose::identity(), piece };
-        let survey = Survey { pieces: vec![piece], grid };
+        let survey = Survey::of_poses(grid, [(Pose::identity(), piece)]);
         let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
         let points = cloud(&survey, &volume, |_| {});
         assert!(points.iter().all(|p| (p.position_m[2] - 2.01).abs() < 1e-3 && p.color == [120, 130, 140]));

@@ -70,7 +70,7 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::dense::{CellGrid, DenseConfig, Survey, SurveyPiece, scene, up};
+    use crate::dense::{CellGrid, DenseConfig, Survey, scene, up};
     use crate::geometry::Pose;
 
     #[test]
@@ -78,8 +78,7 @@ mod tests {
         let config = DenseConfig::default();
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
         let piece = scene::wall(&grid, 2.02, None);
-        let survey =
-            Survey { pieces: vec![SurveyPiece { timestamp_ns: 0, t_world_cam: Pose::identity(), piece }], grid };
+        let survey = Survey::of_poses(grid, [(Pose::identity(), piece)]);
         let turn: UnitQuaternion<f64> = up::of_camera();
         let volume = survey.volume(&config, &turn, |_| {});
         let ground = ground_grid(&volume, [-0.3, 0.3]);

@@ -4,6 +4,7 @@
 //! trajectory at any time. With [`Execution::Inline`] it is entered at once; with [`Execution::Threaded`] on a thread of its own, which
 //! tracking never waits for: a piece that comes while two are waiting is passed over.
 
+use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
@@ -17,7 +18,7 @@ use crate::dense::{DenseConfig, DenseError, Survey, SurveyPiece};
 use crate::dynamic::Tie;
 use crate::geometry::Pose;
 use crate::image::{DepthImage, RgbImage};
-use crate::map::Map;
+use crate::map::{KeyFrameId, Map};
 
 /// Pieces that may wait for the thread.
 const WAITING: usize = 2;
@@ -46,7 +47,7 @@ enum Keeper {
 
 /// What the thread is told.
 enum Order {
-    Follow(Option<(i64, Piece)>, Vec<Option<Pose>>),
+    Follow(Vec<(i64, Piece)>, Vec<Option<Pose>>),
     Show(SyncSender<Volume>),
     Clear,
 }
@@ -82,6 +83,33 @@ impl DenseMapper {
         Ok(Self { config: config.clone(), grid, ties: Vec::new(), last: None, keeper, passed_over: 0 })
     }
 
+    /// The mapper with the pieces of an earlier session, whose `map` this session goes on with; they come before its own.
+    ///
+    /// # Errors
+    /// If the pieces are of other cells or another map.
+    pub fn with_pieces(mut self, survey: Survey, map: &Map) -> Result<Self, DenseError> {
+        let Survey { grid, mut pieces, apart } = survey;
+        if grid != self.grid {
+            let (found, wanted) = (grid.stride_px(), self.grid.stride_px());
+            let (width, height) = (grid.camera().width, grid.camera().height);
+            return Err(DenseError::Cells { found, wanted, width, height });
+        }
+        for (at, one) in apart {
+            pieces.insert(at.min(pieces.len()), one);
+        }
+        let keyframes: BTreeMap<u64, (KeyFrameId, Pose)> =
+            map.keyframes().map(|(id, k)| (k.sequence, (id, k.t_cam_world))).collect();
+        let mut known = Vec::with_capacity(pieces.len());
+        for SurveyPiece { timestamp_ns, keyframe, t_world_cam, piece } in pieces {
+            let (id, t_reference_world) = keyframes.get(&keyframe).ok_or(DenseError::Keyframe(keyframe))?;
+            self.ties.push((*id, (t_reference_world * t_world_cam).inverse()));
+            known.push((timestamp_ns, piece));
+        }
+        let poses = self.poses(map);
+        self.keeper.follow(known, poses);
+        Ok(self)
+    }
+
     /// Whether a keyframe tells enough beyond the last piece to become one.
     pub fn is_due(&self, timestamp_ns: i64, t_world_cam: &Pose) -> bool {
         let Some((last_ns, last)) = &self.last else { return true };
@@ -102,7 +130,7 @@ impl DenseMapper {
         self.ties.push(tie);
         let poses = self.poses(map);
         let pose = poses.last().copied().flatten();
-        if !self.keeper.follow(Some((timestamp_ns, piece)), poses) {
+        if !self.keeper.follow(vec![(timestamp_ns, piece)], poses) {
             self.ties.pop();
             self.passed_over += 1;
         } else if let Some(pose) = pose {
@@ -125,23 +153,21 @@ impl DenseMapper {
         self.ties.is_empty()
     }
 
-    /// Where the map has the pieces now, world from camera: those of the submap that most of them are in; `None` for the others.
-    fn poses(&self, map: &Map) -> Vec<Option<Pose>> {
-        let roots: Vec<_> = self.ties.iter().map(|(keyframe, _)| map.root(*keyframe)).collect();
-        let mut counts: Vec<(usize, _)> = Vec::new();
-        for root in roots.iter().flatten() {
-            match counts.iter_mut().find(|(_, other)| other == root) {
-                Some((count, _)) => *count += 1,
-                None => counts.push((1, *root)),
-            }
-        }
-        // Of equals the one begun first.
-        let largest = counts.iter().rev().max_by_key(|(count, _)| *count).map(|(_, root)| *root);
-        let pose = |((keyframe, t_cam_reference), root): (&Tie, &Option<_>)| {
-            let t_reference_world = map.keyframe_pose(*keyframe).filter(|_| root.is_some() && *root == largest)?;
-            Some((t_cam_reference * t_reference_world).inverse())
+    /// Where the map has the pieces now, world from camera, and the root of the submap that defines this world; `None` for those of a
+    /// submap that was given up.
+    fn places(&self, map: &Map) -> Vec<Option<(KeyFrameId, Pose)>> {
+        let place = |(keyframe, t_cam_reference): &Tie| {
+            let (root, t_reference_world) = (map.root(*keyframe)?, map.keyframe_pose(*keyframe)?);
+            Some((root, (t_cam_reference * t_reference_world).inverse()))
         };
-        self.ties.iter().zip(&roots).map(pose).collect()
+        self.ties.iter().map(place).collect()
+    }
+
+    /// Where the map has the pieces of the submap that most of them are in, world from camera; `None` for the others.
+    fn poses(&self, map: &Map) -> Vec<Option<Pose>> {
+        let places = self.places(map);
+        let largest = largest(&places);
+        places.into_iter().map(|place| place.filter(|(root, _)| Some(*root) == largest).map(|(_, pose)| pose)).collect()
     }
 
     /// The volume as the map has the pieces now; waits for the thread, if there is one.
@@ -155,7 +181,8 @@ impl DenseMapper {
             }
             Keeper::Threaded { sender, .. } => {
                 let (reply, volume) = sync_channel(1);
-                let asked = sender.send(Order::Follow(None, poses)).and_then(|()| sender.send(Order::Show(reply)));
+                let asked =
+                    sender.send(Order::Follow(Vec::new(), poses)).and_then(|()| sender.send(Order::Show(reply)));
                 asked.ok().and_then(|()| volume.recv().ok()).unwrap_or_else(|| Volume::new(&self.config))
             }
             Keeper::Gone => Volume::new(&self.config),
@@ -183,7 +210,8 @@ impl DenseMapper {
 
     /// The pieces with their poses, for products and files. Waits for the thread, if there is one.
     pub fn into_survey(self, map: &Map) -> Survey {
-        let poses = self.poses(map);
+        let places = self.places(map);
+        let largest = largest(&places);
         let pieces = match self.keeper {
             Keeper::Inline(store) => store.pieces,
             Keeper::Threaded { sender, thread } => {
@@ -193,24 +221,42 @@ impl DenseMapper {
             }
             Keeper::Gone => Vec::new(),
         };
-        let pieces = pieces
-            .into_iter()
-            .zip(poses)
-            .filter_map(|((timestamp_ns, piece), pose)| Some(SurveyPiece { timestamp_ns, t_world_cam: pose?, piece }));
-        Survey { pieces: pieces.collect(), grid: self.grid }
+        let mut survey = Survey { pieces: Vec::new(), apart: Vec::new(), grid: self.grid };
+        for (((keyframe, _), place), (timestamp_ns, piece)) in self.ties.iter().zip(places).zip(pieces) {
+            let Some(((root, t_world_cam), (keyframe, _))) = place.zip(map.standing(*keyframe)) else { continue };
+            let one = SurveyPiece { timestamp_ns, keyframe: keyframe.sequence, t_world_cam, piece };
+            if Some(root) == largest {
+                survey.pieces.push(one);
+            } else {
+                survey.apart.push((survey.pieces.len() + survey.apart.len(), one));
+            }
+        }
+        survey
     }
 }
 
+/// The root of the submap that most pieces are in; of equals the one begun first.
+fn largest(places: &[Option<(KeyFrameId, Pose)>]) -> Option<KeyFrameId> {
+    let mut counts: Vec<(usize, KeyFrameId)> = Vec::new();
+    for (root, _) in places.iter().flatten() {
+        match counts.iter_mut().find(|(_, other)| other == root) {
+            Some((count, _)) => *count += 1,
+            None => counts.push((1, *root)),
+        }
+    }
+    counts.iter().rev().max_by_key(|(count, _)| *count).map(|(_, root)| *root)
+}
+
 impl Keeper {
-    /// Returns whether the piece was taken.
-    fn follow(&mut self, piece: Option<(i64, Piece)>, poses: Vec<Option<Pose>>) -> bool {
+    /// Returns whether the pieces were taken.
+    fn follow(&mut self, pieces: Vec<(i64, Piece)>, poses: Vec<Option<Pose>>) -> bool {
         match self {
             Self::Inline(store) => {
-                store.pieces.extend(piece);
+                store.pieces.extend(pieces);
                 store.follow(&poses);
                 true
             }
-            Self::Threaded { sender, .. } => match sender.try_send(Order::Follow(piece, poses)) {
+            Self::Threaded { sender, .. } => match sender.try_send(Order::Follow(pieces, poses)) {
                 Ok(()) => true,
                 Err(TrySendError::Full(_)) => false,
                 Err(TrySendError::Disconnected(_)) => {
@@ -228,8 +274,8 @@ impl Store {
     fn obey(mut self, orders: &Receiver<Order>) -> Self {
         for order in orders {
             match order {
-                Order::Follow(piece, poses) => {
-                    self.pieces.extend(piece);
+                Order::Follow(pieces, poses) => {
+                    self.pieces.extend(pieces);
                     self.follow(&poses);
                 }
                 Order::Show(reply) => {
@@ -327,5 +373,55 @@ mod tests {
         // It hangs where its keyframe is, seen from where it was.
         let t = survey.pieces[0].t_world_cam.translation.vector;
         assert!((t - nalgebra::Vector3::new(0.3, -0.01, 0.0)).norm() < 1e-9, "{t}");
+        assert_eq!(survey.apart.iter().map(|(at, one)| (*at, one.keyframe)).collect::<Vec<_>>(), [(0, 0)]);
+    }
+
+    #[test]
+    fn pieces_of_an_earlier_session_follow_its_map_in_the_next_one() {
+        let (mut map, ties) = map();
+        let piece = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None);
+        for execution in [Execution::Inline, Execution::Threaded] {
+            let mut first = mapper(execution);
+            for (k, tie) in [ties[0], ties[1], ties[0], ties[1], ties[1]].into_iter().enumerate() {
+                first.hang(k as i64, tie, piece.clone(), &map);
+                first.volume(&map);
+            }
+            let survey = first.into_survey(&map);
+            assert_eq!((survey.pieces.len(), survey.apart.len()), (3, 2));
+            // Two more of the other submap make it the larger one.
+            let mut second = mapper(execution).with_pieces(survey.clone(), &map).unwrap();
+            second.hang(10, ties[0], piece.clone(), &map);
+            second.volume(&map);
+            second.hang(11, ties[0], piece.clone(), &map);
+            let after = second.into_survey(&map);
+            assert_eq!(after.pieces.iter().map(|one| one.timestamp_ns).collect::<Vec<_>>(), [0, 2, 10, 11]);
+            assert_eq!(
+                after.apart.iter().map(|(at, one)| (*at, one.timestamp_ns)).collect::<Vec<_>>(),
+                [(1, 1), (3, 3), (4, 4)]
+            );
+            // A correction moves what was loaded.
+            let (moved, by) = (mapper(execution).with_pieces(survey.clone(), &map).unwrap(), 0.5);
+            let pose = map.keyframe(ties[1].0).unwrap().t_cam_world;
+            map.set_pose(ties[1].0, pose * Pose::translation(0.0, -by, 0.0));
+            for (before, after) in survey.pieces.iter().zip(&moved.into_survey(&map).pieces) {
+                let step = after.t_world_cam.translation.vector - before.t_world_cam.translation.vector;
+                assert!((step - nalgebra::Vector3::y() * by).norm() < 1e-9, "{step}");
+            }
+            map.set_pose(ties[1].0, pose);
+        }
+    }
+
+    #[test]
+    fn pieces_of_other_cells_or_of_another_map_are_refused() {
+        let (map, ties) = map();
+        let mut first = mapper(Execution::Inline);
+        first.hang(0, ties[2], scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None), &map);
+        let survey = first.into_survey(&map);
+        let error = mapper(Execution::Inline).with_pieces(survey.clone(), &Map::default()).err().unwrap();
+        assert!(error.to_string().contains("keyframe 2"), "{error}");
+        let coarse = DenseConfig { stride_px: 4, ..Default::default() };
+        let coarse = DenseMapper::new(&coarse, &scene::camera(), Execution::Inline).unwrap();
+        let error = coarse.with_pieces(survey, &map).err().unwrap().to_string();
+        assert!(error.contains("cells of 2 px") && error.contains("dense.stride_px = 2"), "{error}");
     }
 }

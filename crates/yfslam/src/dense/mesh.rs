@@ -192,7 +192,7 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::dense::{CellGrid, DenseConfig, SurveyPiece, scene};
+    use crate::dense::{CellGrid, DenseConfig, scene};
     use crate::geometry::Pose;
 
     #[test]
@@ -201,12 +201,8 @@ mod tests {
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
         let pose = |k: i64| Pose::translation(0.02 * k as f64, 0.0, 0.013 * k as f64);
         // Seen from three places.
-        let piece = |k: i64| SurveyPiece {
-            timestamp_ns: k,
-            t_world_cam: pose(k),
-            piece: scene::wall(&grid, 2.0 - 0.013 * k as f32, None),
-        };
-        let survey = Survey { pieces: (0..3).map(piece).collect(), grid: grid.clone() };
+        let piece = |k: i64| (pose(k), scene::wall(&grid, 2.0 - 0.013 * k as f32, None));
+        let survey = Survey::of_poses(grid.clone(), (0..3).map(piece));
         let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
         let mesh = mesh(&survey, &volume, |_, _| {});
         assert!(mesh.vertices_m.iter().all(|p| (p[2] - 2.0).abs() < 0.004), "on the wall");

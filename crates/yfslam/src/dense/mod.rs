@@ -39,18 +39,39 @@ pub enum DenseError {
     /// A value of the configuration with which nothing can work.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// Pieces of an earlier session on other cells.
+    #[error(
+        "its pieces have cells of {found} px of a camera of {width} × {height}, this session has cells of {wanted} px: take the same camera, \
+         and dense.stride_px = {found}"
+    )]
+    Cells {
+        /// Pixels along each side of their cells.
+        found: usize,
+        /// The same of this session.
+        wanted: usize,
+        /// Their camera's width, px.
+        width: usize,
+        /// Their camera's height, px.
+        height: usize,
+    },
+    /// Pieces of another map.
+    #[error("a piece hangs on keyframe {0}, which the map does not have: the pieces are of another map")]
+    Keyframe(u64),
     /// A thread could not be started.
     #[error("the thread of the dense map could not be started: {0}; raise the limit of threads of this user")]
     Thread(#[from] std::io::Error),
 }
 
 /// Pieces in their places: what all products are made of.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
     /// The cells of the pieces.
     pub grid: CellGrid,
-    /// In the order of time.
+    /// In the order in which they were cut.
     pub pieces: Vec<SurveyPiece>,
+    /// Those of submaps that are not joined with that of most pieces, each in its own world, with its place among all pieces. No product
+    /// shows them; they come in when their submap is joined in a later session.
+    pub apart: Vec<(usize, SurveyPiece)>,
 }
 
 /// A piece in its place.
@@ -58,6 +79,8 @@ pub struct Survey {
 pub struct SurveyPiece {
     /// Time of the frame, ns.
     pub timestamp_ns: i64,
+    /// Sequence number of the keyframe it hangs on.
+    pub keyframe: u64,
     /// World from camera.
     pub t_world_cam: Pose,
     /// Depth and colour.
@@ -65,7 +88,18 @@ pub struct SurveyPiece {
 }
 
 impl Survey {
-    /// Bytes of memory that the pieces take.
+    /// A survey of pieces whose places, world from camera, no map has to say; numbered in the order given.
+    pub fn of_poses(grid: CellGrid, pieces: impl IntoIterator<Item = (Pose, Piece)>) -> Self {
+        let number = |(number, (t_world_cam, piece))| SurveyPiece {
+            timestamp_ns: number as i64,
+            keyframe: number as u64,
+            t_world_cam,
+            piece,
+        };
+        Self { pieces: pieces.into_iter().enumerate().map(number).collect(), apart: Vec::new(), grid }
+    }
+
+    /// Bytes of memory that its pieces take.
     pub fn bytes(&self) -> usize {
         self.pieces.len() * self.grid.rays().len() * Piece::BYTES_PER_CELL
     }

@@ -1,27 +1,28 @@
 //! Pieces as bytes: what `yfslam run --dense` leaves behind.
 //!
-//! In: a survey. Out: bytes, and back. Depth and colour are kept as differences from the cell to the left, which pack better.
+//! In: a survey. Out: bytes, and back. They are a file of their own, or stand in a saved map before what [`crate::map::persist`] writes,
+//! whose keyframes they name. Depth and colour are kept as differences from the cell to the left, which pack better.
 
 use serde::{Deserialize, Serialize};
 
 use crate::dense::piece::{CellGrid, Piece};
 use crate::dense::{Survey, SurveyPiece};
 use crate::map::persist::{CameraRecord, pose_of, pose_record};
-use crate::packed::{Kind, PackedError};
-
-/// What the bytes of every survey begin with.
-const KIND: Kind = Kind { magic: "yfslam dense map", version: 1 };
+use crate::packed::{MAP, PIECES, PackedError};
 
 #[derive(Serialize, Deserialize)]
 struct Records {
     camera: CameraRecord,
     stride_px: u32,
     pieces: Vec<PieceRecord>,
+    /// With their place among all pieces.
+    apart: Vec<(u32, PieceRecord)>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct PieceRecord {
     timestamp_ns: i64,
+    keyframe: u64,
     /// `t_world_cam`: x y z, quaternion x y z w.
     pose: [f64; 7],
     depth: Vec<i16>,
@@ -33,19 +34,27 @@ struct PieceRecord {
 /// # Errors
 /// If it cannot be written, which would be a fault of this program.
 pub fn encode(survey: &Survey) -> Result<Vec<u8>, PackedError> {
-    KIND.pack(&Records {
+    PIECES.pack(&Records {
         camera: CameraRecord::of(survey.grid.camera()),
         stride_px: survey.grid.stride_px() as u32,
         pieces: survey.pieces.iter().map(PieceRecord::of).collect(),
+        apart: survey.apart.iter().map(|(at, one)| (*at as u32, PieceRecord::of(one))).collect(),
     })
 }
 
-/// The survey in `bytes`, checked.
+/// The survey in `bytes`, checked: a file of its own, or that of a saved map.
 ///
 /// # Errors
-/// If the bytes are no survey, of another version, cut, altered, or contradict themselves.
+/// If the bytes are no survey, of another version, cut, altered, or contradict themselves; if they are a map without one.
 pub fn decode(bytes: &[u8]) -> Result<Survey, PackedError> {
-    let Records { camera, stride_px, pieces } = KIND.unpack(bytes)?;
+    if MAP.begins(bytes) {
+        return Err(PackedError::NoPieces);
+    }
+    let (packed, map) = PIECES.split(bytes)?;
+    if !map.is_empty() {
+        MAP.whole(map)?;
+    }
+    let Records { camera, stride_px, pieces, apart } = packed.unpack()?;
     let camera = camera.into_camera();
     let wrong = |what: String| Err(PackedError::Records(what));
     if stride_px == 0 || stride_px as usize > camera.width.min(camera.height) {
@@ -56,8 +65,9 @@ pub fn decode(bytes: &[u8]) -> Result<Survey, PackedError> {
         return wrong(format!("a camera of {} × {} px", camera.width, camera.height));
     }
     let grid = CellGrid::new(&camera, stride_px as usize);
-    let pieces = pieces.into_iter().enumerate().map(|(number, record)| record.into_piece(number, &grid));
-    Ok(Survey { pieces: pieces.collect::<Result<_, _>>()?, grid })
+    let pieces = pieces.into_iter().map(|record| record.into_piece(&grid));
+    let apart = apart.into_iter().map(|(at, record)| Ok((at as usize, record.into_piece(&grid)?)));
+    Ok(Survey { pieces: pieces.collect::<Result<_, _>>()?, apart: apart.collect::<Result<_, _>>()?, grid })
 }
 
 impl PieceRecord {
@@ -66,6 +76,7 @@ impl PieceRecord {
         let (mut last_depth, mut last_color) = (0u16, [0u8; 3]);
         Self {
             timestamp_ns: one.timestamp_ns,
+            keyframe: one.keyframe,
             pose: pose_record(&one.t_world_cam),
             depth: depth.iter().map(|&d| d.wrapping_sub(std::mem::replace(&mut last_depth, d)) as i16).collect(),
             color: color
@@ -78,16 +89,20 @@ impl PieceRecord {
         }
     }
 
-    fn into_piece(self, number: usize, grid: &CellGrid) -> Result<SurveyPiece, PackedError> {
+    fn into_piece(self, grid: &CellGrid) -> Result<SurveyPiece, PackedError> {
         let cells = grid.columns() * grid.rows();
         if self.depth.len() != cells || self.color.len() != 3 * cells {
             let (depth, color) = (self.depth.len(), self.color.len());
             return Err(PackedError::Records(format!(
-                "piece {number} has {depth} depths and {color} colour values for {cells} cells"
+                "the piece of keyframe {} has {depth} depths and {color} colour values for {cells} cells",
+                self.keyframe
             )));
         }
         let Some(t_world_cam) = pose_of(&self.pose) else {
-            return Err(PackedError::Records(format!("the pose of piece {number} is none: {:?}", self.pose)));
+            let Self { keyframe, pose, .. } = self;
+            return Err(PackedError::Records(format!(
+                "the pose of the piece of keyframe {keyframe} is none: {pose:?}"
+            )));
         };
         let (mut depth, mut color) = (0u16, [0u8; 3]);
         let depths = self.depth.iter().map(|&step| {
@@ -100,7 +115,8 @@ impl PieceRecord {
             color
         });
         let color = colors.collect();
-        Ok(SurveyPiece { timestamp_ns: self.timestamp_ns, t_world_cam, piece: Piece { depth, color } })
+        let Self { timestamp_ns, keyframe, .. } = self;
+        Ok(SurveyPiece { timestamp_ns, keyframe, t_world_cam, piece: Piece { depth, color } })
     }
 }
 
@@ -109,41 +125,73 @@ mod tests {
     use nalgebra::{Isometry3, Vector3};
 
     use super::*;
+    use crate::config::FeatureConfig;
     use crate::dense::scene;
+    use crate::map::Map;
+    use crate::map::scene::Scene;
 
     fn survey() -> Survey {
         let grid = CellGrid::new(&scene::camera(), 4);
         let piece = |number: i64| SurveyPiece {
             timestamp_ns: number * 1_000_000_007,
+            keyframe: 2 * number as u64,
             t_world_cam: Isometry3::new(Vector3::new(0.1 * number as f64, 0.0, 0.3), Vector3::y() * 0.2),
             piece: scene::wall(&grid, 2.5, Some(1.0 + 0.1 * number as f32)),
         };
         let mut pieces: Vec<_> = (0..3).map(piece).collect();
         pieces[1].piece.color.iter_mut().enumerate().for_each(|(i, rgb)| *rgb = [i as u8, (i * 7) as u8, 255]);
         pieces[2].piece.depth.iter_mut().for_each(|d| *d |= 1 << 15);
-        Survey { pieces, grid }
+        Survey { pieces, apart: vec![(1, piece(7))], grid }
+    }
+
+    /// A map of one keyframe.
+    fn map() -> Vec<u8> {
+        let (scene, mut map) = (Scene::new(), Map::default());
+        scene.add(&mut map, 0, &scene.pose(0), &[]);
+        crate::map::persist::encode(&map, &scene.sensor.camera, &FeatureConfig::default()).unwrap()
     }
 
     #[test]
     fn a_survey_read_back_is_the_one_that_was_written() {
         let survey = survey();
         let read = decode(&encode(&survey).unwrap()).unwrap();
-        assert_eq!(read.pieces, survey.pieces);
-        assert_eq!(read.grid, survey.grid);
+        assert_eq!(read, survey);
+    }
+
+    #[test]
+    fn a_saved_map_holds_both_what_finds_a_camera_and_what_products_are_made_of() {
+        let (pieces, map) = (encode(&survey()).unwrap(), map());
+        let both = [pieces.clone(), map.clone()].concat();
+        assert_eq!(decode(&both).unwrap(), survey());
+        assert_eq!(crate::map::persist::decode(&both).unwrap().map.keyframe_count(), 1);
+        assert_eq!(decode(&map).unwrap_err(), PackedError::NoPieces);
+        let error = crate::map::persist::decode(&pieces).unwrap_err();
+        assert_eq!(error, PackedError::Foreign(MAP.magic), "pieces alone find no camera");
     }
 
     #[test]
     fn no_cut_and_no_flipped_bit_goes_unnoticed() {
-        let bytes = encode(&survey()).unwrap();
-        for length in (0..bytes.len()).step_by(97) {
-            assert!(decode(&bytes[..length]).is_err(), "cut to {length} bytes");
+        let pieces = encode(&survey()).unwrap();
+        let both = [pieces.clone(), map()].concat();
+        for length in (0..both.len()).step_by(97).filter(|length| *length != pieces.len()) {
+            assert!(decode(&both[..length]).is_err(), "cut to {length} bytes");
         }
-        for bit in (0..8 * bytes.len()).step_by(101) {
-            let mut altered = bytes.clone();
+        for length in (0..both.len()).step_by(97).chain([pieces.len()]) {
+            assert!(crate::map::persist::decode(&both[..length]).is_err(), "cut to {length} bytes");
+        }
+        for bit in (0..8 * both.len()).step_by(101) {
+            let mut altered = both.clone();
             altered[bit / 8] ^= 1 << (bit % 8);
             assert!(decode(&altered).is_err(), "bit {bit} flipped");
+            assert!(crate::map::persist::decode(&altered).is_err(), "bit {bit} flipped");
         }
-        let error = decode(b"yfslam map").unwrap_err().to_string();
-        assert!(error.contains("no yfslam dense map"), "{error}");
+    }
+
+    #[test]
+    fn pieces_of_an_earlier_version_are_refused_by_its_number() {
+        let mut bytes = encode(&survey()).unwrap();
+        bytes[PIECES.magic.len()] = 1;
+        let error = decode(&bytes).unwrap_err().to_string();
+        assert!(error.contains("version 1") && error.contains("make it anew"), "{error}");
     }
 }

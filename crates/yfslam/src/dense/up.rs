@@ -95,7 +95,7 @@ fn levelness(points: &[Vector3<f64>], up: &Vector3<f64>) -> usize {
 mod tests {
     use super::*;
     use crate::dense::piece::{CellGrid, Piece};
-    use crate::dense::{SurveyPiece, scene};
+    use crate::dense::scene;
 
     #[test]
     fn an_upright_picture_gives_the_axes_of_ros() {
@@ -115,10 +115,7 @@ mod tests {
             if down > 0.2 { (1.2 / down) as f32 } else { 0.0 }
         };
         let piece = Piece::of_depths(grid.rays().iter().map(depth), [90; 3]);
-        Survey {
-            pieces: vec![SurveyPiece { timestamp_ns: 0, t_world_cam: crate::geometry::Pose::identity(), piece }],
-            grid,
-        }
+        Survey::of_poses(grid, [(crate::geometry::Pose::identity(), piece)])
     }
 
     #[test]

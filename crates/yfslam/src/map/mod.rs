@@ -79,10 +79,16 @@ impl Map {
 
     /// Current `s_cam_world` of a keyframe, removed or not, into the unit that it was mapped in.
     fn own_pose(&self, id: KeyFrameId) -> Option<Similarity> {
+        let (keyframe, s_asked_found) = self.standing(id)?;
+        Some(s_asked_found * with_scale(&keyframe.t_cam_world, 1.0 / keyframe.unit))
+    }
+
+    /// The keyframe or, if it was removed, the ancestor it was tied to, with `s_asked_found`.
+    pub fn standing(&self, id: KeyFrameId) -> Option<(&KeyFrame, Similarity)> {
         let (mut id, mut s_asked_id) = (id, Similarity::identity());
         loop {
             if let Some(keyframe) = self.keyframes.get(id) {
-                return Some(s_asked_id * with_scale(&keyframe.t_cam_world, 1.0 / keyframe.unit));
+                return Some((keyframe, s_asked_id));
             }
             let (ancestor, s_id_ancestor) = self.removed.get(&id)?;
             s_asked_id *= *s_id_ancestor;

@@ -12,12 +12,10 @@ use crate::config::{Config, FeatureConfig};
 use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds, OrbExtractor};
 use crate::geometry::Pose;
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::packed::Kind;
+use crate::packed::{MAP, PIECES};
 
 /// Version that this code writes, and the only one it reads.
-pub const VERSION: u16 = 1;
-/// What the bytes of every map begin with.
-const KIND: Kind = Kind { magic: "yfslam map", version: VERSION };
+pub const VERSION: u16 = MAP.version;
 
 /// Why bytes are no map that can be used.
 pub use crate::packed::PackedError as MapError;
@@ -92,20 +90,16 @@ struct LandmarkRecord {
 /// # Errors
 /// If the records cannot be written, which would be a fault of this program.
 pub fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Vec<u8>, MapError> {
-    KIND.pack(&Records::of(map, camera, features))
+    MAP.pack(&Records::of(map, camera, features))
 }
 
-/// Whether bytes begin like a map.
-pub fn is_saved_map(bytes: &[u8]) -> bool {
-    bytes.starts_with(KIND.magic.as_bytes())
-}
-
-/// The map in `bytes`, checked.
+/// The map in `bytes`, checked. Pieces that stand before it ([`crate::dense::persist`]) are checked and passed over.
 ///
 /// # Errors
 /// If the bytes are no map, of another version, cut, altered, or contradict themselves.
 pub fn decode(bytes: &[u8]) -> Result<SavedMap, MapError> {
-    let records: Records = KIND.unpack(bytes)?;
+    let map = if PIECES.begins(bytes) { PIECES.split(bytes)?.1 } else { bytes };
+    let records: Records = MAP.unpack(map)?;
     records.into_map().map_err(MapError::Records)
 }
 
@@ -381,10 +375,10 @@ mod tests {
     #[test]
     fn errors_say_what_is_wrong_with_the_bytes() {
         let bytes = encode(&map(), &camera(), &FeatureConfig::default()).unwrap();
-        assert_eq!(decode(b"PK\x03\x04").unwrap_err(), MapError::Foreign(KIND.magic));
+        assert_eq!(decode(b"PK\x03\x04").unwrap_err(), MapError::Foreign(MAP.magic));
         let mut newer = bytes.clone();
-        newer[KIND.magic.len()] = 9;
-        assert_eq!(decode(&newer).unwrap_err(), MapError::Version { magic: KIND.magic, found: 9, version: VERSION });
+        newer[MAP.magic.len()] = 9;
+        assert_eq!(decode(&newer).unwrap_err(), MapError::Version { magic: MAP.magic, found: 9, version: VERSION });
         let announced = bytes.len() as u64;
         assert_eq!(decode(&bytes[..100]).unwrap_err(), MapError::Length { found: 100, announced });
     }
