@@ -10,6 +10,7 @@ import numpy as np
 
 VISIBLE = 0.15  # of a cut person's box must remain for it to count; below, its place teaches nothing
 LEAST_SIDE = 9.0  # px
+EMPTY = 0.45  # of the pictures lose everybody: a part is taken that shows nobody
 
 
 def angle(rng):
@@ -108,6 +109,18 @@ def erase(rng, image):
     image[int(y):int(y + h), int(x):int(x + w)] = rng.integers(0, 256, 3)
 
 
+def without_people(rng, image, boxes):
+    """A square part of a square picture that shows nobody, if one is found: what else stands about must be learnt too."""
+    for _ in range(12):
+        share = rng.uniform(0.3, 0.8)
+        low = rng.uniform(0, 1 - share, 2)
+        apart = (boxes[:, 3:5] <= low) | (boxes[:, 1:3] >= low + share)
+        if apart.any(1).all():
+            (x, y), side = (low * image.shape[0]).astype(int), int(share * image.shape[0])
+            return image[y:y + side, x:x + side], boxes[:0]
+    return image, boxes
+
+
 def sample(rng, draw, side, mosaic=0.35, strength=1.0):
     """A picture of side x side px, its boxes [n, 5] (class, corners, px) and places to ignore [m, 4].
 
@@ -120,6 +133,8 @@ def sample(rng, draw, side, mosaic=0.35, strength=1.0):
     found, ignored = [], []
     for (x0, x1), (y0, y1) in spans:
         image, boxes = draw(rng)
+        if rng.random() < EMPTY:
+            image, boxes = without_people(rng, image, boxes)
         single = len(spans) == 1
         zoom = np.exp(rng.uniform(np.log(0.65), np.log(2.3))) if single else np.exp(rng.uniform(np.log(0.8), np.log(1.8)))
         zoom *= (352 / side) ** 0.3
