@@ -282,7 +282,7 @@ mod tests {
         let mut down = Down::default();
         for frame in 0..300 {
             let found = f64::from(down.roll_deg(&swinging(frame), 0.0));
-            assert!(if frame < LEAST_FRAMES { found == 0.0 } else { true }, "{found}");
+            assert!(frame >= LEAST_FRAMES || found == 0.0, "{found}");
             let roll = 25.0 * (frame as f64 / 20.0).cos();
             assert!(frame < 120 || (found - roll).abs() < 10.0, "{frame}: {found} {roll}");
             down.see(&swinging(frame));
