@@ -6,6 +6,7 @@ use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 
 use crate::config::PoseOptimizerConfig;
 use crate::geometry::{Pinhole, Pose, perturbed};
+use crate::optimize::damped::levenberg_marquardt;
 use crate::optimize::residual::{Measurement, huber, projection_jacobian};
 
 /// A landmark seen in the frame whose pose is wanted.
@@ -40,7 +41,7 @@ pub fn optimize_pose(
             break;
         }
         let robust = round < config.robust_rounds;
-        minimise(camera, config, robust, t_cam_world, observations);
+        levenberg_marquardt(config, t_cam_world, |pose| linearise(camera, robust, pose, observations), perturbed);
         inliers = classify(camera, t_cam_world, observations);
     }
     inliers
@@ -53,44 +54,6 @@ pub fn position_sigma_m(camera: &Pinhole, t_cam_world: &Pose, observations: &[Po
     // A left perturbation moves the camera by its translation part.
     let covariance = h.try_inverse().map(|inverse| inverse.fixed_view::<3, 3>(0, 0).trace());
     covariance.filter(|variance| *variance >= 0.0).map_or(f64::INFINITY, f64::sqrt)
-}
-
-/// Levenberg–Marquardt over the six parameters of a left perturbation.
-fn minimise(
-    camera: &Pinhole,
-    config: &PoseOptimizerConfig,
-    robust: bool,
-    pose: &mut Pose,
-    observations: &[PoseObservation],
-) {
-    let mut lambda = config.initial_damping;
-    let (mut h, mut b, mut cost) = linearise(camera, robust, pose, observations);
-    for _ in 0..config.iterations {
-        let mut damped = h;
-        for i in 0..6 {
-            damped[(i, i)] += lambda * h[(i, i)].max(1e-9);
-        }
-        let Some(step) = damped.cholesky().map(|c| c.solve(&b)) else {
-            return;
-        };
-        let candidate = perturbed(&step, pose);
-        let (h_new, b_new, cost_new) = linearise(camera, robust, &candidate, observations);
-        // A comparison with NaN is false: a step into nonsense is never taken.
-        if cost_new <= cost {
-            let gain = cost - cost_new;
-            *pose = candidate;
-            (h, b, cost) = (h_new, b_new, cost_new);
-            lambda *= 0.2;
-            if gain < config.relative_tolerance * cost {
-                return;
-            }
-        } else {
-            lambda *= 10.0;
-            if lambda > 1e6 {
-                return;
-            }
-        }
-    }
 }
 
 /// Normal equations H, b and the robust cost at `pose`, over the inliers.

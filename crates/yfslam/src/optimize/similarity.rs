@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
 
 use crate::config::PoseOptimizerConfig;
 use crate::geometry::{Pinhole, Pose, Similarity, Tangent, TangentMap, sim3_perturbed, skew};
+use crate::optimize::damped::levenberg_marquardt;
 use crate::optimize::residual::{Measurement, huber, projection_jacobian};
 
 /// Limit of χ² with two degrees of freedom up to which a point fits: its 99 % quantile. Source: ORB-SLAM2.
@@ -87,42 +88,10 @@ pub fn optimize_similarity(
         if inliers < 3 {
             return inliers;
         }
-        minimise(camera, config, round < config.robust_rounds, s_b_a, correspondences);
+        let robust = round < config.robust_rounds;
+        levenberg_marquardt(config, s_b_a, |s| linearise(camera, robust, s, correspondences), sim3_perturbed);
     }
     inliers
-}
-
-/// Levenberg-Marquardt over the seven parameters of a left perturbation.
-fn minimise(
-    camera: &Pinhole,
-    config: &PoseOptimizerConfig,
-    robust: bool,
-    s_b_a: &mut Similarity,
-    correspondences: &[Correspondence],
-) {
-    let mut lambda = config.initial_damping;
-    let (mut h, mut b, mut cost) = linearise(camera, robust, s_b_a, correspondences);
-    for _ in 0..config.iterations {
-        let mut damped = h;
-        for i in 0..7 {
-            damped[(i, i)] += lambda * h[(i, i)].max(1e-9);
-        }
-        let Some(step) = damped.cholesky().map(|c| c.solve(&b)) else { return };
-        let candidate = sim3_perturbed(&step, s_b_a);
-        let (h_new, b_new, cost_new) = linearise(camera, robust, &candidate, correspondences);
-        // A comparison with NaN is false: a step into nonsense is never taken.
-        if cost_new <= cost {
-            let gain = cost - cost_new;
-            *s_b_a = candidate;
-            (h, b, cost) = (h_new, b_new, cost_new);
-            lambda *= 0.2;
-            if gain < config.relative_tolerance * cost {
-                return;
-            }
-        } else {
-            lambda *= 10.0;
-        }
-    }
 }
 
 /// Normal equations H, b and the robust cost, over the inliers.
