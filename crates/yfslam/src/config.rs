@@ -229,6 +229,8 @@ config_section! {
         edge_px: f32 = 3.0,
         /// Frames over which a track is carried without a box, of those in which a detector looked.
         max_misses: usize = 30,
+        /// Overlap (IoU) of a box with that of a body which is carried, and seen before the wall, from which on it is his.
+        same_box_iou: f32 = 0.7,
         /// How far a body that is carried can be from its last depth before it is somebody else, m.
         max_jump_m: f32 = 0.2,
         /// Share of its former size at which a body that is carried is seen whole, and its box follows it.

@@ -6,7 +6,7 @@ use rand_pcg::Pcg32;
 
 use crate::config::DynamicConfig;
 use crate::detection::{BoundingBox, Detection};
-use crate::dynamic::body_mask::{BodyMask, CELL_PX};
+use crate::dynamic::body_mask::BodyMask;
 use crate::dynamic::depth_group::{DepthGroup, Grouping, largest_exact, largest_ransac};
 use crate::dynamic::tracks::Track;
 use crate::features::FrameFeatures;
@@ -71,15 +71,14 @@ impl DepthGroups {
         Some(self.center(&group))
     }
 
-    /// Depth of the body of a track in what other bodies leave free of its box, m, and the share of the box that it fills.
-    pub fn body_in(&mut self, config: &DynamicConfig, track: &Track, bodies: &BodyMask) -> Option<(f32, f32)> {
+    /// Depth of the body of a track in what other bodies leave free of its box, m, and how many of its cells that is.
+    pub fn body_in(&mut self, config: &DynamicConfig, track: &Track, bodies: &BodyMask) -> Option<(f32, usize)> {
         self.feature_depths.clear();
         self.pixel_depths.clear();
         bodies.free_depths(&track.bbox, &mut self.pixel_depths);
         self.pixel_depths.sort_unstable_by(f32::total_cmp);
         let group = self.body(config, track)?;
-        let cells = track.bbox.area() / (CELL_PX * CELL_PX) as f32;
-        Some((self.center(&group), group.members as f32 / cells.max(1.0)))
+        Some((self.center(&group), group.members))
     }
 
     /// Sorted depths of the features and of a grid of pixels inside a box.

@@ -6,6 +6,7 @@
 
 use crate::config::DynamicConfig;
 use crate::dynamic::body_depth::DepthGroups;
+use crate::dynamic::body_mask::BodyMask;
 use crate::dynamic::outline::Outlines;
 use crate::dynamic::tracks::Tracks;
 use crate::dynamic::views::Views;
@@ -19,6 +20,8 @@ pub struct Full {
     tracks: Tracks,
     groups: DepthGroups,
     outlines: Outlines,
+    /// What must stay out of maps: bodies count here even if features on them are trusted, since they stand still or nothing else is left.
+    unmapped: BodyMask,
     regions: Vec<Region>,
     views: Views,
     /// Depth of the cells that views compare, m.
@@ -72,12 +75,16 @@ impl Full {
             }
             if as_before {
                 self.outlines.bodies.release_coarse(cell);
+                if self.tracks.list.get(track).is_none_or(|track| track.misses > 0) {
+                    self.unmapped.release_coarse(cell);
+                }
             }
         }
         for (t, (track, [same, other])) in self.tracks.list.iter_mut().zip(&self.verdicts).enumerate() {
             if track.misses > 0 && *same as usize >= config.full.view_min_cells && same > other {
                 track.ended = true;
                 self.outlines.bodies.release(t);
+                self.unmapped.release(t);
             }
         }
     }
@@ -107,6 +114,7 @@ impl DynamicFilter for Full {
         }
         self.outlines.begin(evidence);
         self.outlines.outline(config, &mut self.groups, &mut self.tracks, 0.0);
+        self.unmapped.clone_from(&self.outlines.bodies);
         self.regions.clear();
         let alive = self.tracks.list.iter().filter(|track| !track.ended);
         self.regions.extend(alive.map(|track| track.region(config)));
@@ -120,9 +128,10 @@ impl DynamicFilter for Full {
         self.sample();
         self.views.compare_all(&config.full, first, &self.coarse_m);
         self.return_unmoved(config);
-        let (bodies, mut found) = (&mut self.outlines.bodies, false);
+        let (bodies, unmapped, mut found) = (&mut self.outlines.bodies, &mut self.unmapped, false);
         self.views.clusters(&config.full, &self.static_m, |column, row| {
             bodies.mark_coarse(column, row);
+            unmapped.mark_coarse(column, row);
             found = true;
         });
         let mut trusted: usize = features.features.iter().filter(|f| f.trust > 0.0).count();
@@ -152,8 +161,7 @@ impl DynamicFilter for Full {
     }
 
     fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
-        let bodies = self.outlines.bodies.clone();
-        MovingMask { bodies, ..MovingMask::default() }
+        MovingMask { bodies: self.unmapped.clone(), ..MovingMask::default() }
     }
 
     fn forget_views(&mut self) {

@@ -15,6 +15,8 @@ pub struct Outlines {
     pub bodies: BodyMask,
     /// Tracks that have no outline yet.
     waiting: Vec<usize>,
+    /// Tracks of this frame's boxes that have one, and the depths of their bodies, m.
+    outlined: Vec<(usize, f32)>,
 }
 
 impl Outlines {
@@ -32,13 +34,24 @@ impl Outlines {
         self.waiting.clear();
         self.waiting
             .extend((0..tracks.list.len()).filter(|&t| !tracks.list[t].ended && tracks.list[t].score >= min_score));
+        self.outlined.clear();
         self.adopt(config, tracks);
         while let Some((t, center_m)) = self.nearest(config, groups, tracks) {
             self.waiting.retain(|&w| w != t);
+            if tracks.give_box_back(config, t, center_m) {
+                continue;
+            }
             let track = &mut tracks.list[t];
             track.depth_m = Some(center_m);
             let body = self.bodies.grow(config, t, &track.bbox, center_m);
             track.note_body(config, &body);
+            if track.misses == 0 {
+                self.outlined.push((t, center_m));
+            }
+        }
+        // Last, for they might be somebody else's trunk.
+        for &(t, center_m) in &self.outlined {
+            self.bodies.add_islands(config, t, &tracks.list[t].bbox, center_m);
         }
     }
 
@@ -66,21 +79,21 @@ impl Outlines {
         groups: &mut DepthGroups,
         tracks: &mut Tracks,
     ) -> Option<(usize, f32)> {
-        let (mut nearest, mut i): (Option<(f32, f32, usize)>, usize) = (None, 0);
+        let (mut nearest, mut i): (Option<(f32, usize, usize)>, usize) = (None, 0);
         while let Some(&t) = self.waiting.get(i) {
             let track = &tracks.list[t];
             let body = groups.body_in(config, track, &self.bodies);
-            let Some((center_m, share)) = body.filter(|(center_m, _)| track.can_be_at(config, *center_m)) else {
+            let Some((center_m, cells)) = body.filter(|(center_m, _)| track.can_be_at(config, *center_m)) else {
                 self.waiting.remove(i);
                 self.miss(config, tracks, t, body.map(|(center_m, _)| center_m));
                 continue;
             };
-            // Of two at like depth the one who fills more of the box.
-            let is_nearer = nearest.is_none_or(|(z, s, _)| {
-                center_m < z - config.group_half_width_m || (center_m < z + config.group_half_width_m && share > s)
+            // Of two boxes in which somebody is seen, his own shows more of him.
+            let is_nearer = nearest.is_none_or(|(z, most, _)| {
+                center_m < z - config.group_half_width_m || (center_m < z + config.group_half_width_m && cells > most)
             });
             if is_nearer {
-                nearest = Some((center_m, share, t));
+                nearest = Some((center_m, cells, t));
             }
             i += 1;
         }

@@ -101,6 +101,24 @@ impl Tracks {
         self.list.retain(|track| track.missed_looks <= max_misses);
     }
 
+    /// Gives the box of a new track, whose body would be `center_m` away, to one that was carried and whose body stands before that, if there
+    /// is one with much the same box; the new one then ends. It was opened because somebody else covers most of the box, and what is left
+    /// of it is the wall.
+    pub fn give_box_back(&mut self, config: &DynamicConfig, from: usize, center_m: f32) -> bool {
+        let Track { bbox, score, depth_m, .. } = self.list[from];
+        let is_his = |track: &Track| {
+            let seen = track.misses > 0 && track.depth_age == 0 && !track.ended;
+            seen && track.depth_m.is_some_and(|z| z < center_m) && track.bbox.iou(&bbox) >= config.full.same_box_iou
+        };
+        if depth_m.is_some() {
+            return false;
+        }
+        let Some(track) = self.list.iter_mut().find(|track| is_his(track)) else { return false };
+        track.follow(&Detection { class: 0, score, bbox });
+        self.list[from].ended = true;
+        true
+    }
+
     /// Takes a frame in for which nobody looked for boxes: tracks are carried on, however long that lasts.
     pub fn carry(&mut self, [width, height]: [usize; 2]) {
         let image = BoundingBox { x_min: 0.0, y_min: 0.0, x_max: width as f32, y_max: height as f32 };
@@ -120,9 +138,10 @@ impl Track {
         Region { bbox: self.bbox, score: self.score, misses: self.misses, depth_m }
     }
 
-    /// Whether a body that fills its box at this depth, m, can be its own: without a box to say so, bodies do not jump.
+    /// Whether a body that fills its box at this depth, m, can be its own: without a sure box to say so, bodies do not jump.
     pub fn can_be_at(&self, config: &DynamicConfig, center_m: f32) -> bool {
-        self.misses == 0 || self.depth_m.is_none_or(|z| (center_m - z).abs() <= config.full.max_jump_m)
+        let is_sure = self.misses == 0 && self.score >= config.open_score;
+        is_sure || self.depth_m.is_none_or(|z| (center_m - z).abs() <= config.full.max_jump_m)
     }
 
     /// Hides it behind what appeared in its box at this depth, m. Returns a track of that, if it is nearer and came just now: whoever hides
@@ -252,6 +271,29 @@ mod tests {
             tracks.update(&config, 10, &[], &[], [640, 480]);
         }
         assert!(tracks.list.is_empty(), "looks that find nothing end it");
+    }
+
+    #[test]
+    fn a_box_in_which_somebody_else_stands_in_front_goes_back_to_whoever_it_belongs_to() {
+        let config = DynamicConfig::default();
+        let mut tracks = walker(&config);
+        // Somebody 1 m away covers most of the box: that is the depth found in it, so that a track is opened.
+        tracks.update(&config, 10, &[detection(130.0, 0.8)], &[Some(1.0)], [640, 480]);
+        tracks.list[0].note_body(&config, &Extent { middle: [185.0, 240.0], cells: 300 });
+        assert_eq!(tracks.list.iter().map(|t| t.misses).collect::<Vec<_>>(), [1, 0]);
+        assert!(!tracks.give_box_back(&config, 1, 1.0), "who stands in front of him is somebody else");
+        assert!(tracks.give_box_back(&config, 1, 3.0), "the wall is nobody");
+        assert_eq!((tracks.list[0].misses, tracks.list[0].bbox.x_min, tracks.list[1].ended), (0, 130.0, true));
+    }
+
+    #[test]
+    fn a_faint_box_does_not_take_a_body_elsewhere() {
+        let config = DynamicConfig::default();
+        let mut tracks = walker(&config);
+        tracks.update(&config, 10, &[detection(130.0, 0.8)], &[Some(2.0)], [640, 480]);
+        assert!(tracks.list[0].can_be_at(&config, 2.5));
+        tracks.update(&config, 10, &[detection(138.0, 0.15)], &[Some(2.0)], [640, 480]);
+        assert!(tracks.list[0].misses == 0 && !tracks.list[0].can_be_at(&config, 2.5));
     }
 
     #[test]
