@@ -67,6 +67,13 @@ impl BodyMask {
         self.owner.resize(self.depth_m.len(), 0);
     }
 
+    /// Becomes a copy of another, in the memory it has.
+    pub fn copy(&mut self, other: &Self) {
+        (self.columns, self.rows) = (other.columns, other.rows);
+        self.depth_m.clone_from(&other.depth_m);
+        self.owner.clone_from(&other.owner);
+    }
+
     /// Appends the depths in a box that belong to no body yet, m.
     pub fn free_depths(&self, bbox: &BoundingBox, out: &mut Vec<f32>) {
         let [left, top, right, bottom] = self.cells(bbox, 0.0);

@@ -114,7 +114,7 @@ impl DynamicFilter for Full {
         }
         self.outlines.begin(evidence);
         self.outlines.outline(config, &mut self.groups, &mut self.tracks, 0.0);
-        self.unmapped.clone_from(&self.outlines.bodies);
+        self.unmapped.copy(&self.outlines.bodies);
         self.regions.clear();
         let alive = self.tracks.list.iter().filter(|track| !track.ended);
         self.regions.extend(alive.map(|track| track.region(config)));
