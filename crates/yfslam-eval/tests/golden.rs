@@ -1,6 +1,6 @@
 //! Every figure equals that of `evo` on published trajectories; `golden.csv` holds the figures and the commands that made them.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "a test may")]
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
 //! The official detector finds the synthetic people, with the sensor's noise on. Needs the model of the data folder.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod recall;
 

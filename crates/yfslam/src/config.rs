@@ -229,7 +229,7 @@ config_section! {
         edge_px: f32 = 3.0,
         /// Frames over which a track is carried without a box, of those in which a detector looked.
         max_misses: usize = 30,
-        /// Overlap (IoU) of a box with that of a body which is carried, and seen before the wall, from which on it is his.
+        /// Overlap (IoU) with the box of somebody who is carried from which on a new box that holds only the wall behind him is his.
         same_box_iou: f32 = 0.7,
         /// How far a body that is carried can be from its last depth before it is somebody else, m.
         max_jump_m: f32 = 0.2,

@@ -2,7 +2,7 @@
 //! circumstance. A person counts if the box of the visible pixels is taller than 30 % of the picture, and is found if a
 //! detection of class `person` with a score of at least 0.3 overlaps that box with an IoU of at least 0.5; each detection
 //! finds one person.
-#![allow(dead_code, clippy::unwrap_used)]
+#![allow(dead_code, clippy::unwrap_used, reason = "shared by a test and an example, of which each uses a part")]
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
