@@ -6,7 +6,7 @@
 
 use anyhow::Result;
 use nalgebra::{Isometry3, Point3};
-use yfslam::dense::background::background;
+use yfslam::dense::background::Backgrounds;
 use yfslam::dense::{CellGrid, DenseConfig, Piece, Survey, Volume};
 use yfslam::image::Image;
 use yfslam_synth::World;
@@ -83,12 +83,13 @@ pub fn judge(survey: &Survey, volume: &Volume, world: &World) -> Result<Views> {
     (empty.people, empty.actors) = (0, Default::default());
     let empty = World::new(&empty)?;
     let config = DenseConfig::default();
+    let views = Backgrounds::new(survey, volume, |_| {});
     let (mut all, mut filled) = (Error::default(), Error::default());
     let (mut cells, mut known, mut hidden, mut hidden_known, mut shown) = (0usize, 0usize, 0usize, 0usize, 0usize);
     for (number, one) in survey.pieces.iter().enumerate().step_by(EVERY) {
         let shot = empty.frame(index_of(&empty, one.timestamp_ns));
         let exact = Piece::cut(&config, &survey.grid, &shot.frame.color, &shot.frame.depth, |_, _| false);
-        let view = background(survey, volume, &survey.grid, &one.t_world_cam, Some(&one.piece), Some(number));
+        let Some(view) = views.of_piece(number) else { continue };
         let mut light = [[0.0f64; 3]; 2];
         for cell in (0..view.valid.data().len()).filter(|cell| !one.piece.moves(*cell)) {
             for (sums, rgb) in light.iter_mut().zip([view.color.data()[cell], exact.color(cell)]) {

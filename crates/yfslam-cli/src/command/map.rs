@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use nalgebra::{UnitQuaternion, Vector3};
-use yfslam::dense::background::{Background, background};
+use yfslam::dense::background::{Background, Backgrounds};
 use yfslam::dense::cloud::{CloudPoint, cloud};
 use yfslam::dense::grid::{GridCell, ground_grid};
 use yfslam::dense::mesh::mesh;
@@ -267,11 +267,13 @@ impl Maker<'_> {
         let mut fullest: Vec<(usize, usize)> = (0..pieces.len()).map(|number| (moving(number), number)).collect();
         fullest.sort_by_key(|(moving, number)| (std::cmp::Reverse(*moving), *number));
         fullest.truncate(BACKGROUNDS);
+        let views = with_progress(self.terminal, "looking beside people", self.survey, |told| {
+            Backgrounds::new(self.survey, &self.volume, told)
+        });
         let (mut filled, mut hidden) = (0, 0);
         for &(moving, number) in &fullest {
             let one = &pieces[number];
-            let (own, pose) = (Some(&one.piece), &one.t_world_cam);
-            let view = background(self.survey, &self.volume, grid, pose, own, Some(number));
+            let Some(view) = views.of_piece(number) else { continue };
             let colors = (0..cells).map(|cell| one.piece.color(cell)).collect();
             let seen = RgbImage::from_vec(grid.columns(), grid.rows(), colors).unwrap_or_default();
             write_view(&self.folder.join("background"), &format!("{number:06}"), &seen, &view)?;

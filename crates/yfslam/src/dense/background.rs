@@ -4,12 +4,11 @@
 //! section III-E) projects earlier frames into the view. Here depth is projected, and colour looked up at that depth in the frames that
 //! are nearest: it stays sharp, and one of them that still shows somebody is outvoted.
 //!
-//! What moves is outlined generously, for no part of it may become a surface. Where nothing surer is known, a cell within an outline is
-//! believed if its reading ends on a surface of the map, which other views have made, or goes on with one: it shows what stands beside
-//! somebody.
+//! Where nothing surer is known, cells within an outline that show what stands beside somebody are believed.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use crate::dense::beside::beside;
 use crate::dense::piece::{CellGrid, Piece};
 use crate::dense::voxels::voxel_at;
 use crate::dense::{Survey, Volume};
@@ -55,6 +54,8 @@ struct Source<'a> {
     /// How far its view is from the one wanted.
     apart: f64,
     piece: &'a Piece,
+    /// Which of its cells show what stands beside somebody.
+    beside: &'a [bool],
     grid: &'a CellGrid,
     volume: &'a Volume,
     t_view_source: Isometry3<f32>,
@@ -68,9 +69,7 @@ impl Source<'_> {
     fn look(&self, point: &Point3<f32>, sureness: Sureness) -> Option<Vector3<f32>> {
         let p = self.t_view_source.inverse_transform_point(point);
         let at = self.grid.project(&p)?;
-        look(self.grid, self.piece, at, p.z, sureness, |cell| {
-            stands(self.volume, &self.t_map_source, self.grid, self.piece, cell).is_some()
-        })
+        look(self.grid, self.piece, at, p.z, sureness, self.beside)
     }
 
     /// Brings its light to that of the view's own piece, by what both see.
@@ -90,51 +89,83 @@ impl Source<'_> {
     }
 }
 
-/// The view from `t_world_cam` on the cells of `grid`. Of the view's `own` piece, on the same cells, what does not move is kept; piece
-/// number `except` is not asked.
-pub fn background(
-    survey: &Survey,
-    volume: &Volume,
-    grid: &CellGrid,
-    t_world_cam: &Pose,
-    own: Option<&Piece>,
-    except: Option<usize>,
-) -> Background {
-    let mut sources: Vec<Source> = Vec::new();
-    for (number, one) in survey.pieces.iter().enumerate().filter(|(number, _)| Some(*number) != except) {
-        let Some(t_map_source) = volume.pose(number) else { continue };
-        let t_view_source = t_world_cam.inverse() * one.t_world_cam;
-        sources.push(Source {
-            apart: t_view_source.translation.vector.norm() + 2.0 * t_view_source.rotation.angle(),
-            piece: &one.piece,
-            grid: &survey.grid,
-            volume,
-            t_view_source: t_view_source.cast(),
-            t_map_source: t_map_source.cast(),
-            gain: Vector3::repeat(1.0),
-        });
+/// Makes views of a survey without what moves.
+pub struct Backgrounds<'a> {
+    survey: &'a Survey,
+    volume: &'a Volume,
+    /// Of each piece that the volume has, which of its cells show what stands beside somebody.
+    beside: Vec<Vec<bool>>,
+}
+
+impl<'a> Backgrounds<'a> {
+    /// Views of a survey with its volume. `told` hears how many pieces are looked through.
+    pub fn new(survey: &'a Survey, volume: &'a Volume, mut told: impl FnMut(usize)) -> Self {
+        let mut besides = Vec::with_capacity(survey.pieces.len());
+        for (number, one) in survey.pieces.iter().enumerate() {
+            told(number);
+            let shown = |t_map_cam: Isometry3<f32>| beside(volume, &t_map_cam, &survey.grid, &one.piece);
+            besides.push(volume.pose(number).map(|pose| shown(pose.cast())).unwrap_or_default());
+        }
+        Self { survey, volume, beside: besides }
     }
-    sources.sort_by(|a, b| a.apart.total_cmp(&b.apart));
-    if let Some(own) = own {
-        sources.iter_mut().take(SOURCES).for_each(|source| source.match_light(grid, own));
+
+    /// The view of piece `number`: of what it shows itself, what does not move is kept.
+    pub fn of_piece(&self, number: usize) -> Option<Background> {
+        let one = self.survey.pieces.get(number)?;
+        let sources = self.sources(&one.t_world_cam, Some(number));
+        Some(background(&self.survey.grid, sources, &one.piece, &self.beside[number]))
     }
-    let t_map_view = sources.first().map(|source| source.t_map_source * source.t_view_source.inverse());
-    let own_beside = |cell| stands(volume, t_map_view.as_ref()?, grid, own?, cell);
+
+    /// The view of a frame that is none of the survey's pieces, from `t_world_cam`: `own` is cut from it on the same cells.
+    pub fn of_frame(&self, own: &Piece, t_world_cam: &Pose) -> Background {
+        let sources = self.sources(t_world_cam, None);
+        let t_map_view = sources.first().map(|source| source.t_map_source * source.t_view_source.inverse());
+        let beside = t_map_view.map(|t_map_view| beside(self.volume, &t_map_view, &self.survey.grid, own));
+        background(&self.survey.grid, sources, own, &beside.unwrap_or_default())
+    }
+
+    /// All pieces but the view's own, nearest first.
+    fn sources(&self, t_world_cam: &Pose, own: Option<usize>) -> Vec<Source<'_>> {
+        let mut sources: Vec<Source> = Vec::new();
+        for (number, one) in self.survey.pieces.iter().enumerate().filter(|(number, _)| Some(*number) != own) {
+            let Some(t_map_source) = self.volume.pose(number) else { continue };
+            let t_view_source = t_world_cam.inverse() * one.t_world_cam;
+            sources.push(Source {
+                apart: t_view_source.translation.vector.norm() + 2.0 * t_view_source.rotation.angle(),
+                piece: &one.piece,
+                beside: &self.beside[number],
+                grid: &self.survey.grid,
+                volume: self.volume,
+                t_view_source: t_view_source.cast(),
+                t_map_source: t_map_source.cast(),
+                gain: Vector3::repeat(1.0),
+            });
+        }
+        sources.sort_by(|a, b| a.apart.total_cmp(&b.apart));
+        sources
+    }
+}
+
+/// The view on the cells of `grid`, from `sources` and what its `own` piece shows, also `beside` what moves.
+fn background(grid: &CellGrid, mut sources: Vec<Source<'_>>, own: &Piece, beside: &[bool]) -> Background {
+    sources.iter_mut().take(SOURCES).for_each(|source| source.match_light(grid, own));
     let nowhere = vec![0.0; grid.columns() * grid.rows()];
     let sure_m = projected_depth(grid, &sources, Sureness::Sure, &nowhere);
     let mut depth_m = projected_depth(grid, &sources, Sureness::Likely, &sure_m);
     let mut color = RgbImage::new(grid.columns(), grid.rows());
     let mut valid = Image::new(grid.columns(), grid.rows());
     for (cell, (z, &[x, y])) in depth_m.iter_mut().zip(grid.rays()).enumerate() {
-        let kept = own.filter(|own| !own.moves(cell));
-        if let Some(own_m) = kept.and_then(|own| own.surface_m(cell)) {
+        if let Some(own_m) = own.surface_m(cell) {
             *z = own_m;
         }
         let asked =
             |z: f32, sureness| (z > 0.0).then(|| vote(&sources, &Point3::new(x * z, y * z, z), sureness)).flatten();
-        let known = kept.map(|own| own.color(cell)).or_else(|| asked(*z, Sureness::Sure)).or_else(|| {
-            let Some((own, own_m)) = own.zip(own_beside(cell)) else { return asked(*z, Sureness::Likely) };
-            *z = own_m;
+        let kept = (!own.moves(cell)).then(|| own.color(cell));
+        let known = kept.or_else(|| asked(*z, Sureness::Sure)).or_else(|| {
+            let Some(shown) = own.reading(cell).filter(|_| beside.get(cell) == Some(&true)) else {
+                return asked(*z, Sureness::Likely);
+            };
+            *z = shown.depth_m;
             Some(own.color(cell))
         });
         if let Some(known) = known {
@@ -146,28 +177,13 @@ pub fn background(
     Background { color, depth_m, valid }
 }
 
-/// Depth of what a cell shows, m, if the map has a surface there, or one next to it and nobody has seen through the place itself.
-fn stands(volume: &Volume, t_map_cam: &Isometry3<f32>, grid: &CellGrid, piece: &Piece, cell: usize) -> Option<f32> {
-    let config = volume.config();
-    let z = piece.reading(cell)?.depth_m;
-    // Far away the volume says nothing.
-    if z > config.max_range_m {
-        return None;
-    }
-    let [x, y] = grid.rays()[cell];
-    let at @ [i, j, k] = voxel_at(&(t_map_cam * Point3::new(x * z, y * z, z)), 1.0 / config.resolution_m);
-    let beside = |n: i32| volume.is_occupied([i + n % 3 - 1, j + n / 3 % 3 - 1, k + n / 9 - 1]);
-    let holds = volume.get(at).map_or_else(|| (0..27).any(beside), |known| known.occupied);
-    holds.then_some(z)
-}
-
 /// Depth of the nearest static surface in each cell, m; 0 where there is none. It stays where it is `known`. Of what is in its range,
 /// only what the volume has as occupied counts.
 fn projected_depth(grid: &CellGrid, sources: &[Source], sureness: Sureness, known: &[f32]) -> Vec<f32> {
     let (columns, rows) = (grid.columns() as i32, grid.rows() as i32);
     let mut depth_m = known.to_vec();
     for source in sources {
-        let Source { piece, volume, t_view_source, t_map_source, .. } = source;
+        let Source { piece, beside, volume, t_view_source, t_map_source, .. } = source;
         let config = volume.config();
         for (cell, [x, y]) in source.grid.rays().iter().enumerate() {
             let likely = sureness == Sureness::Likely;
@@ -177,7 +193,7 @@ fn projected_depth(grid: &CellGrid, sources: &[Source], sureness: Sureness, know
             let seen = t_view_source * p;
             let Some([column, row]) = grid.project(&seen) else { continue };
             let holds = || match sureness {
-                Sureness::Likely => stands(volume, t_map_source, source.grid, piece, cell).is_some(),
+                Sureness::Likely => beside[cell],
                 // Far away the volume says nothing.
                 Sureness::Sure => {
                     z > config.max_range_m
@@ -226,14 +242,14 @@ fn vote(sources: &[Source], point: &Point3<f32>, sureness: Sureness) -> Option<[
 }
 
 /// The colour of a piece at a position, between its cells; `None` if another surface or something that moves is there. If that is
-/// asked for what is likely, such cells are left out, and those that `stands` says show the map are not.
+/// asked for what is likely, such cells are left out, and those that show what stands `beside` are not.
 fn look(
     grid: &CellGrid,
     piece: &Piece,
     [column, row]: [f32; 2],
     z: f32,
     sureness: Sureness,
-    stands: impl Fn(usize) -> bool,
+    beside: &[bool],
 ) -> Option<Vector3<f32>> {
     let (left, top) = (column.floor(), row.floor());
     let (dx, dy) = (column - left, row - top);
@@ -252,7 +268,7 @@ fn look(
         let depth = piece.reading(cell).map(|reading| reading.depth_m);
         let other = depth.is_some_and(|depth| (depth - z).abs() > SAME_M + SAME_SHARE * z);
         let likely = sureness == Sureness::Likely;
-        if other || piece.moves(cell) && !(likely && stands(cell)) {
+        if other || piece.moves(cell) && !(likely && beside[cell]) {
             if likely {
                 continue;
             }
@@ -291,10 +307,9 @@ mod tests {
         }
         let survey = Survey::of_poses(grid.clone(), [(Pose::identity(), marked.clone()), (Pose::identity(), other)]);
         let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
-        let seen = background(&survey, &volume, &grid, &Pose::identity(), Some(&marked), Some(0));
+        let seen = Backgrounds::new(&survey, &volume, |_| {}).of_piece(0).unwrap();
         let known = |column: usize, row: usize| seen.valid.data()[row * columns + column];
-        assert!(known(half - 1, 30) && known(half, 30), "a voxel is as wide as a cell");
-        assert!(!known(half + 4, 30), "further on the map says nothing");
+        assert!(known(half - 1, 30) && known(half + 4, 30) && known(columns - 1, 30), "the wall goes on");
         assert!(!known(4, 4), "somebody in the way stays out");
         assert!(seen.depth_m.data().iter().all(|z| *z == 0.0 || (z - 3.01).abs() < 0.01));
     }
@@ -318,7 +333,9 @@ mod tests {
         let pieces = [(Pose::identity(), own.clone()), (moved, other)];
         let survey = Survey::of_poses(grid.clone(), pieces);
         let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
-        let seen = background(&survey, &volume, &grid, &Pose::identity(), Some(&own), Some(0));
+        let views = Backgrounds::new(&survey, &volume, |_| {});
+        let seen = views.of_piece(0).unwrap();
+        assert_eq!(seen, views.of_frame(&own, &Pose::identity()), "it need not be one of the pieces");
         assert!(seen.valid.data().iter().all(|valid| *valid), "everything is known");
         let mut filled = 0;
         for cell in (0..own.depth.len()).filter(|cell| own.moves(*cell)) {

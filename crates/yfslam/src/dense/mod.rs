@@ -10,6 +10,7 @@
 //! that come after and see through it.
 
 pub mod background;
+mod beside;
 pub mod cloud;
 pub mod grid;
 mod mapper;
