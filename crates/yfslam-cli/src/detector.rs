@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 use yfslam::image::{Image, RgbImage};
 use yfslam::{Config, Detection, Detector, DetectorError};
 use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, YoloFastestV2};
@@ -19,6 +20,8 @@ use crate::cpu;
 
 /// The word for the network that comes with the program.
 const EMBEDDED: &str = "embedded";
+/// Digits of a hash in a line for people, who find the whole in `--version` and in the files.
+const SHORT_HASH: usize = 12;
 
 /// Which network finds people.
 #[derive(Args, Clone, Debug)]
@@ -56,8 +59,8 @@ pub struct ModelIdentity {
     pub file: PathBuf,
     /// Its size.
     pub bytes: usize,
-    /// CRC-32 (IEEE 802.3) of the file, hexadecimal.
-    pub crc32: String,
+    /// SHA-256 (FIPS 180-4) of the file, hexadecimal.
+    pub sha256: String,
     /// Number of classes it knows.
     pub classes: usize,
 }
@@ -65,14 +68,18 @@ pub struct ModelIdentity {
 impl fmt::Display for ModelIdentity {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let name = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
-        write!(f, "{name} network (CRC-32 {}, {} kB)", self.crc32, self.bytes.div_ceil(1000))
+        let start = self.sha256.get(..SHORT_HASH).unwrap_or(&self.sha256);
+        write!(f, "{name} network (SHA-256 {start}…, {} kB)", self.bytes.div_ceil(1000))
     }
 }
 
 /// Which network is in this program, in a line.
 pub fn describe_embedded() -> String {
-    let (crc32, kilobytes) = (crc32fast::hash(EMBEDDED_MODEL), EMBEDDED_MODEL.len().div_ceil(1000));
-    format!("embedded network: CRC-32 {crc32:08x}, {kilobytes} kB")
+    format!("embedded network: SHA-256 {}, {} kB", sha256(EMBEDDED_MODEL), EMBEDDED_MODEL.len().div_ceil(1000))
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A detector ready to run.
@@ -123,12 +130,8 @@ pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetecto
             (network, file.clone(), Cow::from(bytes))
         }
     };
-    let identity = ModelIdentity {
-        file,
-        bytes: bytes.len(),
-        crc32: format!("{:08x}", crc32fast::hash(&bytes)),
-        classes: network.class_names().len(),
-    };
+    let identity =
+        ModelIdentity { file, bytes: bytes.len(), sha256: sha256(&bytes), classes: network.class_names().len() };
     let (sender, times) = channel();
     Ok(LoadedDetector { detector: Box::new(Timed { network, times: sender }), times, identity })
 }
@@ -154,5 +157,17 @@ impl Detector for Timed {
 
     fn mask(&self) -> Option<&Image<u8>> {
         self.network.mask()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hashes_are_those_of_other_programs() {
+        // FIPS 180-4's own example, and the empty message.
+        assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+        assert_eq!(sha256(b""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
     }
 }

@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn boxes_are_outlined_in_the_colour_of_their_class_with_a_bar_as_long_as_the_score() {
-        let model = ModelIdentity { file: "x".into(), bytes: 1, crc32: String::new(), classes: 2 };
+        let model = ModelIdentity { file: "x".into(), bytes: 1, sha256: String::new(), classes: 2 };
         let list = FoundList {
             yfslam: "",
             model: &model,
