@@ -14,7 +14,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use yfslam::image::{Image, RgbImage};
 use yfslam::{Config, Detection, Detector, DetectorError};
-use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, YoloFastestV2};
+use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, Network, YoloFastestV2};
 
 use crate::cpu;
 
@@ -84,7 +84,7 @@ fn sha256(bytes: &[u8]) -> String {
 
 /// A detector ready to run.
 pub struct LoadedDetector {
-    pub detector: Box<dyn Detector>,
+    pub detector: Box<dyn Network>,
     /// One for each image it has seen.
     pub times: Receiver<Took>,
     pub identity: ModelIdentity,
@@ -119,7 +119,7 @@ pub fn load_for(args: &DetectorArgs, config: &Config) -> Result<LoadedDetector> 
 /// The file cannot be read, is no ONNX model, or holds another network.
 pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetector> {
     let config = DetectorConfig { class_names: args.detector_classes.clone(), ..config };
-    let (network, file, bytes): (Box<dyn Detector>, _, _) = match &args.detector {
+    let (network, file, bytes): (Box<dyn Network>, _, _) = match &args.detector {
         None | Some(Model::Embedded) => {
             (Box::new(YoloFastestV2::embedded(&config)?), EMBEDDED.into(), EMBEDDED_MODEL.into())
         }
@@ -138,7 +138,7 @@ pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetecto
 
 /// Tells how long each image took.
 struct Timed {
-    network: Box<dyn Detector>,
+    network: Box<dyn Network>,
     times: Sender<Took>,
 }
 
@@ -157,6 +157,12 @@ impl Detector for Timed {
 
     fn mask(&self) -> Option<&Image<u8>> {
         self.network.mask()
+    }
+}
+
+impl Network for Timed {
+    fn objects(&self) -> Option<&Image<u16>> {
+        self.network.objects()
     }
 }
 
