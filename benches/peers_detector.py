@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Times the detector's forward pass beside ONNX Runtime and ncnn: one thread each, the same weights, the same 352×352 input.
+"""Times the detector's forward pass beside ONNX Runtime and ncnn: one thread each, the same weights (the official ones; ncnn takes no
+others), the same 352×352 input. The embedded network, of one class, is timed too, in ONNX Runtime and here.
 
 python3 benches/peers_detector.py [DATA_FOLDER] [--rounds 5] [--runs 100]
 (pip: onnxruntime, ncnn, numpy; DATA_FOLDER defaults to YFSLAM_DATA, else ../shared/data)
 
 The engines take turns for a few rounds, so that all see the same load; reported are the minimum and the median of the process
-CPU time, in ms, and the ratio of our best minimum to the faster peer's. Loading and the first runs do not count.
+CPU time, in ms, and the ratio of our best minimum to the fastest peer's, for each network. Loading and the first runs do not count.
 """
 import argparse
 import json
@@ -20,6 +21,7 @@ import numpy as np
 import onnxruntime
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+EMBEDDED = ROOT / "crates/yfslam-detect/models/person.onnx"
 WARM_UP = 10
 
 
@@ -34,10 +36,10 @@ def clock(runs, call):
     return times
 
 
-def onnx_runtime(models, image):
+def onnx_runtime(model, image):
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
-    session = onnxruntime.InferenceSession(models / "yolo-fastestv2-coco.onnx", options, providers=["CPUExecutionProvider"])
+    session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
     name = session.get_inputs()[0].name
     return lambda: session.run(None, {name: image[None]})
 
@@ -61,9 +63,9 @@ def ncnn_net(models, image, half):
     return run
 
 
-def ours(models, runs):
+def ours(model, runs):
     command = ["cargo", "run", "--release", "--quiet", "-p", "yfslam-detect", "--example", "time_detector", "--"]
-    output = subprocess.run([*command, models / "yolo-fastestv2-coco.onnx", str(runs)], cwd=ROOT, check=True, capture_output=True)
+    output = subprocess.run([*command, model, str(runs)], cwd=ROOT, check=True, capture_output=True)
     return [json.loads(line) for line in output.stdout.splitlines()]
 
 
@@ -75,24 +77,28 @@ def main():
     arguments = parser.parse_args()
     models = pathlib.Path(arguments.data) / "models"
     image = np.random.default_rng(0).random((3, 352, 352), dtype=np.float32)
-    peers = {
-        f"ONNX Runtime {onnxruntime.__version__}": onnx_runtime(models, image),
-        f"ncnn {ncnn.__version__} fp16 storage": ncnn_net(models, image, True),
-        f"ncnn {ncnn.__version__} fp32": ncnn_net(models, image, False),
-    }
-    ours(models, 1)  # builds
+    official, engine = models / "yolo-fastestv2-coco.onnx", f"ONNX Runtime {onnxruntime.__version__}"
+    networks = {"official": official, "embedded": EMBEDDED}
+    peers = {f"{engine}, {name}": onnx_runtime(model, image) for name, model in networks.items()}
+    for half in (True, False):
+        peers[f"ncnn {ncnn.__version__} {'fp16 storage' if half else 'fp32'}, official"] = ncnn_net(models, image, half)
+    ours(official, 1)  # builds
     times = {}
     for _ in range(arguments.rounds):
         for name, run in peers.items():
             times.setdefault(name, []).extend(clock(arguments.runs, run))
-        for line in ours(models, arguments.runs):
-            for what in ("forward", "detect"):
-                times.setdefault(f"yfslam {line['level']}, {what}", []).extend(line[f"{what}_all_ms"])
+        for name, model in networks.items():
+            for line in ours(model, arguments.runs):
+                for what in ("forward", "detect"):
+                    times.setdefault(f"yfslam {line['level']} {what}, {name}", []).extend(line[f"{what}_all_ms"])
     for name, values in times.items():
-        print(f"{name:36} min {min(values):6.2f} ms   median {statistics.median(values):6.2f} ms")
-    best_peer = min(peers, key=lambda name: min(times[name]))
-    mine = min((name for name in times if name.endswith("forward")), key=lambda name: min(times[name]))
-    print(f"ratio of minima, {mine} to {best_peer}: {min(times[mine]) / min(times[best_peer]):.2f}")
+        print(f"{name:44} min {min(values):6.2f} ms   median {statistics.median(values):6.2f} ms")
+    least = lambda names: min(names, key=lambda name: min(times[name]))
+    for network in networks:
+        mine = least(name for name in times if name.endswith(f"forward, {network}"))
+        # ncnn has the official network only, which is larger by the output of 79 classes.
+        peer = least(name for name in peers if name.endswith(network) or name.startswith("ncnn"))
+        print(f"ratio of minima, {mine} to {peer}: {min(times[mine]) / min(times[peer]):.2f}")
 
 
 main()

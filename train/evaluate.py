@@ -1,11 +1,12 @@
 """Measures detectors side by side, with one evaluator.
 
-    python -m train.evaluate CACHE MODEL... [--data DATA] [--json FILE]
+    python -m train.evaluate CACHE MODEL... [--data DATA] [--empty FOLDER] [--json FILE]
 
 MODEL: a checkpoint (.pt) or an ONNX file with six raw maps (anchors from its metadata, else those of COCO; `person` must be one of
 its classes). On the held-out pictures of CACHE: AP50 of people, recall and precision at score 0.3, upright and turned by 30, 60 and
 90 degrees to either side. With the folder of development data: how often everyone in sight is covered on
-labels/bonn_crowd_dev_100.json, and how many people are wrongly reported on tum_fr1_xyz_dev.
+labels/bonn_crowd_dev_100.json, and how many people are wrongly reported on tum_fr1_xyz_dev. With a folder of recordings in which
+there is nobody (FOLDER/*/rgb): how many are reported there.
 """
 
 import argparse
@@ -117,13 +118,27 @@ def false_alarms(network, data, score=0.3):
     return {"frames": len(files), "reported_per_frame": total / len(files), "false_per_frame": false / len(files)}
 
 
-def report(network, cache, data):
+def nobody(network, folder, score=0.3):
+    """People reported per frame of recordings without any, and in the worst of the recordings."""
+    per_frame = []
+    for recording in sorted(path for path in folder.iterdir() if (path / "rgb").is_dir()):
+        files = sorted((recording / "rgb").iterdir())
+        per_frame.append([int((network(cv2.imread(str(file)))[1] > score).sum()) for file in files])
+        print(f"    {recording.name:36} {np.mean(per_frame[-1]):.3f}")
+    frames = np.concatenate(per_frame)
+    return {"recordings": len(per_frame), "frames": len(frames), "false_per_frame": float(frames.mean()),
+            "frames_with_any": float((frames > 0).mean()), "worst_recording": float(max(map(np.mean, per_frame)))}
+
+
+def report(network, cache, data, empty):
     rows = {"upright": held_out(network, cache)}
     for angle in (30, 60, 90):
         rows[f"turned {angle}"] = held_out(network, cache, (-angle, angle))
     if data:
         rows["bonn_crowd_dev"] = crowd(network, data)
         rows["tum_fr1_xyz_dev"] = false_alarms(network, data)
+    if empty:
+        rows["nobody"] = nobody(network, empty)
     return rows
 
 
@@ -132,12 +147,13 @@ def main():
     parser.add_argument("cache", type=pathlib.Path)
     parser.add_argument("models", type=pathlib.Path, nargs="+")
     parser.add_argument("--data", type=pathlib.Path, help="folder of development data, with rgbd/")
+    parser.add_argument("--empty", type=pathlib.Path, help="folder of recordings without people, each with rgb/")
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
     cache = Cache(options.cache, ["person"], held_out=True)
     everything = {}
     for path in options.models:
-        everything[path.name] = report(Network(path), cache, options.data)
+        everything[path.name] = report(Network(path), cache, options.data, options.empty)
         print(path.name)
         for name, row in everything[path.name].items():
             print(f"  {name:16}", " ".join(f"{k} {v:.3f}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()), flush=True)

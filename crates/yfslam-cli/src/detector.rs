@@ -11,14 +11,17 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 use yfslam::image::{Image, RgbImage};
 use yfslam::{Config, Detection, Detector, DetectorError};
-use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, YoloFastestV2};
+use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, Network, YoloFastestV2};
 
 use crate::cpu;
 
 /// The word for the network that comes with the program.
 const EMBEDDED: &str = "embedded";
+/// Digits of a hash in a line for people, who find the whole in `--version` and in the files.
+const SHORT_HASH: usize = 12;
 
 /// Which network finds people.
 #[derive(Args, Clone, Debug)]
@@ -56,8 +59,8 @@ pub struct ModelIdentity {
     pub file: PathBuf,
     /// Its size.
     pub bytes: usize,
-    /// CRC-32 (IEEE 802.3) of the file, hexadecimal.
-    pub crc32: String,
+    /// SHA-256 (FIPS 180-4) of the file, hexadecimal.
+    pub sha256: String,
     /// Number of classes it knows.
     pub classes: usize,
 }
@@ -65,19 +68,23 @@ pub struct ModelIdentity {
 impl fmt::Display for ModelIdentity {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let name = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
-        write!(f, "{name} network (CRC-32 {}, {} kB)", self.crc32, self.bytes.div_ceil(1000))
+        let start = self.sha256.get(..SHORT_HASH).unwrap_or(&self.sha256);
+        write!(f, "{name} network (SHA-256 {start}…, {} kB)", self.bytes.div_ceil(1000))
     }
 }
 
 /// Which network is in this program, in a line.
 pub fn describe_embedded() -> String {
-    let (crc32, kilobytes) = (crc32fast::hash(EMBEDDED_MODEL), EMBEDDED_MODEL.len().div_ceil(1000));
-    format!("embedded network: CRC-32 {crc32:08x}, {kilobytes} kB")
+    format!("embedded network: SHA-256 {}, {} kB", sha256(EMBEDDED_MODEL), EMBEDDED_MODEL.len().div_ceil(1000))
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A detector ready to run.
 pub struct LoadedDetector {
-    pub detector: Box<dyn Detector>,
+    pub detector: Box<dyn Network>,
     /// One for each image it has seen.
     pub times: Receiver<Took>,
     pub identity: ModelIdentity,
@@ -112,7 +119,7 @@ pub fn load_for(args: &DetectorArgs, config: &Config) -> Result<LoadedDetector> 
 /// The file cannot be read, is no ONNX model, or holds another network.
 pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetector> {
     let config = DetectorConfig { class_names: args.detector_classes.clone(), ..config };
-    let (network, file, bytes): (Box<dyn Detector>, _, _) = match &args.detector {
+    let (network, file, bytes): (Box<dyn Network>, _, _) = match &args.detector {
         None | Some(Model::Embedded) => {
             (Box::new(YoloFastestV2::embedded(&config)?), EMBEDDED.into(), EMBEDDED_MODEL.into())
         }
@@ -123,19 +130,15 @@ pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetecto
             (network, file.clone(), Cow::from(bytes))
         }
     };
-    let identity = ModelIdentity {
-        file,
-        bytes: bytes.len(),
-        crc32: format!("{:08x}", crc32fast::hash(&bytes)),
-        classes: network.class_names().len(),
-    };
+    let identity =
+        ModelIdentity { file, bytes: bytes.len(), sha256: sha256(&bytes), classes: network.class_names().len() };
     let (sender, times) = channel();
     Ok(LoadedDetector { detector: Box::new(Timed { network, times: sender }), times, identity })
 }
 
 /// Tells how long each image took.
 struct Timed {
-    network: Box<dyn Detector>,
+    network: Box<dyn Network>,
     times: Sender<Took>,
 }
 
@@ -154,5 +157,23 @@ impl Detector for Timed {
 
     fn mask(&self) -> Option<&Image<u8>> {
         self.network.mask()
+    }
+}
+
+impl Network for Timed {
+    fn objects(&self) -> Option<&Image<u16>> {
+        self.network.objects()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hashes_are_those_of_other_programs() {
+        // FIPS 180-4's own example, and the empty message.
+        assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+        assert_eq!(sha256(b""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
     }
 }

@@ -1,6 +1,6 @@
 //! Outlines, discs and tints on a colour image; whatever lies outside is cut off.
 
-use yfslam::image::RgbImage;
+use yfslam::image::{Image, RgbImage};
 
 /// Red, green, blue.
 pub type Color = [u8; 3];
@@ -21,6 +21,20 @@ pub fn tint(image: &mut RgbImage, x: usize, y: usize, color: Color, share: f32) 
     if let Some(&old) = image.get(x, y) {
         let mix = |old: u8, new: u8| (f32::from(old) * (1.0 - share) + f32::from(new) * share) as u8;
         point(image, x as i64, y as i64, std::array::from_fn(|channel| mix(old[channel], color[channel])));
+    }
+}
+
+/// Mixes `color` into the pixels where `mask` is not 0, as [`tint`]; those on its edge become it.
+pub fn stain(image: &mut RgbImage, mask: &Image<u8>, color: Color, share: f32) {
+    for y in 0..mask.height() {
+        for x in 0..mask.width() {
+            // Before the first column or row, the position wraps to one that no image has.
+            let beside = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
+            if mask.get(x, y).is_some_and(|value| *value != 0) {
+                let is_edge = beside.iter().any(|&(x, y)| mask.get(x, y) == Some(&0));
+                tint(image, x, y, color, if is_edge { 1.0 } else { share });
+            }
+        }
     }
 }
 

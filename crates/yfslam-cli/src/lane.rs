@@ -5,7 +5,7 @@
 use anyhow::Result;
 use yfslam::dense::persist::encode;
 use yfslam::tracking::TrackingState;
-use yfslam::{Config, RgbdFrame, Slam};
+use yfslam::{Config, Detector, RgbdFrame, Slam};
 use yfslam_eval::report::{DenseMap, Picture};
 use yfslam_eval::{AlignmentKind, EvalError, EvalOptions, Evaluation, ExpectedFrames};
 
@@ -92,7 +92,7 @@ impl Lane {
         let open_score = config.dynamic.open_score;
         let overlay = extras.overlay.then(|| Overlay::prepare(folder.path(), open_score)).transpose()?;
         let moments = extras.moments.map(|count| Moments::new(source.stamps_ns.len(), count, open_score));
-        let (detector, times) = detector.map(|d| (d.detector, d.times)).unzip();
+        let (detector, times) = detector.map(|d| (d.detector as Box<dyn Detector>, d.times)).unzip();
         let earlier = extras.map.pieces(extras.dense)?;
         let slam = extras.map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
         let pipeline = Pipeline::new(slam, times);

@@ -5,6 +5,7 @@
 //! ```
 
 mod accuracy;
+mod apart;
 mod bench;
 mod boxes;
 mod cli;
@@ -24,6 +25,7 @@ mod overlay;
 mod pipeline;
 mod progress;
 mod report;
+mod runs;
 mod settings;
 mod source;
 mod summary;

@@ -102,7 +102,13 @@ fn a_recording_without_boxes_is_looked_at_by_the_network_in_the_program() {
     assert!(output.stderr.contains("the network in this program"), "{}", output.stderr);
     let identity = report(&folder.path().join("out"))["boxes"]["detector"].clone();
     let version = succeeds(folder.path(), &["--version"]).stdout;
-    assert!(version.contains(identity["crc32"].as_str().unwrap()), "{version} {identity}");
+    let hash = identity["sha256"].as_str().unwrap();
+    assert!(hash.len() == 64 && version.contains(hash), "{version} {identity}");
+    // The same network, given as a file.
+    let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../yfslam-detect/models/person.onnx");
+    succeeds(folder.path(), &["run", "seq", "--detector", model, "--out", "given", "-q"]);
+    let given = report(&folder.path().join("given"))["boxes"]["detector"].clone();
+    assert_eq!((&given["file"], &given["sha256"]), (&model.into(), &identity["sha256"]));
 }
 
 #[test]

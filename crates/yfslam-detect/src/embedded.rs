@@ -17,6 +17,7 @@ impl YoloFastestV2 {
 
 #[cfg(test)]
 mod tests {
+    use sha2::{Digest, Sha256};
     use yfslam::Detector;
 
     use super::*;
@@ -26,5 +27,13 @@ mod tests {
         let detector = YoloFastestV2::embedded(&DetectorConfig::default()).unwrap();
         assert!(detector.class_names().iter().any(|name| name == "person"), "{:?}", detector.class_names());
         assert!(EMBEDDED_MODEL.len() <= 1_000_000, "{}", EMBEDDED_MODEL.len());
+    }
+
+    #[test]
+    fn the_card_of_the_embedded_network_names_its_size_and_hash() {
+        let card = include_str!("../models/README.md");
+        let hash: String = Sha256::digest(EMBEDDED_MODEL).iter().map(|byte| format!("{byte:02x}")).collect();
+        let size = format!("{},{:03} bytes", EMBEDDED_MODEL.len() / 1000, EMBEDDED_MODEL.len() % 1000);
+        assert!(card.contains(&format!("{size}, SHA-256 `{hash}`")), "{size}, {hash}");
     }
 }

@@ -44,5 +44,5 @@ pub use embedded::EMBEDDED_MODEL;
 pub use error::ModelError;
 pub use fearless_simd::Level;
 pub use kernels::available_levels;
-pub use load::load;
+pub use load::{Network, load};
 pub use yolo::{RawOutput, YoloFastestV2};

@@ -11,6 +11,7 @@ use yfslam_detect::DetectorConfig;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
 
+use crate::apart::Apart;
 use crate::detector::{self, DetectorArgs, LoadedDetector};
 use crate::found::{FoundBox, FoundIn, FoundList, Look};
 use crate::output::OutputFolder;
@@ -27,8 +28,10 @@ Examples:
   yfslam detect images/ --roll 90      taken by a camera that lay on its right side
 
 In the output folder:
-  boxes.json   each image, a line: its boxes with class, score, and left, top, right and bottom edge in px
-  pictures/    with --pictures, each image with its boxes; the bar in a box is as long as its score
+  boxes.json   each image, a line: its boxes with class, score, and left, top, right and bottom edge in px; from a network that
+               segments also the mask in COCO's form: size [height, width] and counts, the lengths of runs down the columns, of
+               pixels beside and of the object in turns
+  pictures/    with --pictures, each image with its boxes and masks; the bar in a box is as long as its score
 
 Ends with success only if every image could be read; of the others boxes are written all the same.";
 
@@ -70,14 +73,14 @@ pub struct DetectArgs {
 pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
     let files = args.files()?;
     let config = DetectorConfig { score_threshold: args.score, iou_threshold: args.iou, ..Default::default() };
-    let LoadedDetector { mut detector, times, identity } = detector::load(&args.detector, config)?;
-    if let Some(unknown) = args.classes.iter().find(|class| !detector.class_names().contains(class)) {
-        let known = detector.class_names().join(", ");
-        bail!("the network does not know the class '{unknown}' (--class); it knows: {known}");
+    let LoadedDetector { detector, times, identity } = detector::load(&args.detector, config)?;
+    let mut detector = Apart::new(detector);
+    let known = detector.known().to_vec();
+    if let Some(unknown) = args.classes.iter().find(|class| !known.contains(class)) {
+        bail!("the network does not know the class '{unknown}' (--class); it knows: {}", known.join(", "));
     }
     let out = OutputFolder::prepare(Some(&args.out), "detect")?;
     let pictures = args.pictures.then(|| pictures(&out)).transpose()?;
-    let known = detector.class_names().to_vec();
     let wanted = |class: &&str| args.classes.is_empty() || args.classes.iter().any(|asked| asked == class);
     let mut list = FoundList {
         yfslam: env!("CARGO_PKG_VERSION"),
@@ -89,9 +92,13 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
     let mut progress = Progress::new(terminal, "detect", files.len());
     let mut upright = Upright::default();
     for (index, file) in files.iter().enumerate() {
-        let look = match look(file, &mut *detector, &mut upright, args.roll) {
+        let look = match look(file, &mut detector, &mut upright, args.roll) {
             Ok((image, detections)) => {
-                let of = |d: Detection| Some(FoundBox::new(d, known.get(d.class).map(String::as_str).filter(wanted)?));
+                let mask = upright.mask(&detector);
+                let of = |d: Detection| {
+                    let class = detector.class_names().get(d.class).map(String::as_str).filter(wanted)?;
+                    Some(FoundBox::new(d, class, mask))
+                };
                 let boxes: Vec<FoundBox> = detections.into_iter().filter_map(of).collect();
                 if let Some(folder) = &pictures {
                     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
@@ -174,12 +181,7 @@ fn pictures(out: &OutputFolder) -> Result<PathBuf> {
 }
 
 /// Reads an image and finds boxes in it, where the camera was rolled by `roll_deg`.
-fn look(
-    file: &Path,
-    detector: &mut dyn Detector,
-    upright: &mut Upright,
-    roll_deg: i32,
-) -> Result<(RgbImage, Vec<Detection>)> {
+fn look(file: &Path, detector: &mut Apart, upright: &mut Upright, roll_deg: i32) -> Result<(RgbImage, Vec<Detection>)> {
     let bytes = std::fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
     let (mut image, mut found) = (RgbImage::default(), Vec::new());
     decode_color(&bytes, None, &mut image).map_err(|error| anyhow!("{} {error}", file.display()))?;

@@ -1,10 +1,10 @@
 //! Masks of a network that segments (Bolya et al., YOLACT, ICCV 2019, section 3.2): each object's is a sum of prototypes that all share,
 //! weighed by the object's own coefficients and cut at its box.
 //!
-//! In: prototypes, coefficients, boxes. Out: the class that each pixel of the image shows.
+//! In: prototypes, coefficients, boxes. Out: the object, and the class, that each pixel of the image shows.
 
-use yfslam::Detection;
 use yfslam::image::Image;
+use yfslam::{BoundingBox, Detection};
 
 use super::letterbox::Letterbox;
 
@@ -16,22 +16,26 @@ pub(super) struct Prototypes<'a> {
 }
 
 impl Prototypes<'_> {
-    /// Draws the pixels of an object, found in the image that `letterbox` holds, as 1 + its class; those of former objects are kept.
-    /// Objects of classes that a mask cannot tell are left out.
-    pub(super) fn draw(self, coefficients: &[f32], object: &Detection, letterbox: &Letterbox, mask: &mut Image<u8>) {
-        let Ok(value) = u8::try_from(object.class + 1) else { return };
+    /// Marks the pixels of an object within its box, found in the image that `letterbox` holds; those of former objects are kept.
+    pub(super) fn draw(
+        self,
+        coefficients: &[f32],
+        bbox: &BoundingBox,
+        letterbox: &Letterbox,
+        mark: u16,
+        objects: &mut Image<u16>,
+    ) {
         let [_, height, width] = self.shape;
         let stride = [letterbox.size.1 as f32 / width as f32, letterbox.size.0 as f32 / height as f32];
         let edges = |low: f32, high: f32, side: usize| low.max(0.0).floor() as usize..(high.ceil() as usize).min(side);
-        let bbox = &object.bbox;
         let (rows, columns) =
-            (edges(bbox.y_min, bbox.y_max, mask.height()), edges(bbox.x_min, bbox.x_max, mask.width()));
+            (edges(bbox.y_min, bbox.y_max, objects.height()), edges(bbox.x_min, bbox.x_max, objects.width()));
         for row in rows {
             for column in columns.clone() {
                 let at = letterbox.to_input([column as f32 + 0.5, row as f32 + 0.5]);
                 let inside = self.sum(coefficients, [at[0] / stride[0] - 0.5, at[1] / stride[1] - 0.5]) > 0.0;
-                if let Some(pixel) = mask.row_mut(row).get_mut(column).filter(|pixel| inside && **pixel == 0) {
-                    *pixel = value;
+                if let Some(pixel) = objects.row_mut(row).get_mut(column).filter(|pixel| inside && **pixel == 0) {
+                    *pixel = mark;
                 }
             }
         }
@@ -51,4 +55,16 @@ impl Prototypes<'_> {
         });
         weighed.sum()
     }
+}
+
+/// The classes of objects that are marked as 1 + their place in `found`, as 1 + class; 0 for a class that a mask cannot tell.
+pub(super) fn classes(objects: &Image<u16>, found: &[Detection]) -> Image<u8> {
+    let values: Vec<u8> = std::iter::once(0)
+        .chain(found.iter().map(|object| u8::try_from(object.class + 1).unwrap_or_default()))
+        .collect();
+    let mut mask = Image::new(objects.width(), objects.height());
+    for (pixel, mark) in mask.data_mut().iter_mut().zip(objects.data()) {
+        *pixel = values.get(usize::from(*mark)).copied().unwrap_or_default();
+    }
+    mask
 }

@@ -17,7 +17,7 @@ use yfslam::{Detection, Detector, DetectorError};
 use crate::decode::suppress;
 use crate::onnx::Model;
 use crate::yolo::{check, class_names, parse_names};
-use crate::{DetectorConfig, ModelError};
+use crate::{DetectorConfig, ModelError, Network};
 use layout::Layout;
 use letterbox::Letterbox;
 use masks::Prototypes;
@@ -46,7 +46,8 @@ pub struct AnyYolo {
     config: DetectorConfig,
     class_names: Vec<String>,
     candidates: Vec<(Detection, usize)>,
-    /// What each pixel of the last image shows, if the network segments.
+    /// Which object each pixel of the last image shows, and which class, if the network segments.
+    objects: Option<Image<u16>>,
     mask: Option<Image<u8>>,
 }
 
@@ -72,7 +73,8 @@ impl AnyYolo {
             given => given,
         });
         let class_names = class_names(&model, config, classes).map_err(mismatch)?;
-        Ok(Self { runtime, layout, letterbox, config: config.clone(), class_names, candidates: Vec::new(), mask: None })
+        let (candidates, objects, mask) = Default::default();
+        Ok(Self { runtime, layout, letterbox, config: config.clone(), class_names, candidates, objects, mask })
     }
 }
 
@@ -98,25 +100,35 @@ impl Detector for AnyYolo {
         let mut boxes: Vec<Detection> = self.candidates.iter().map(|(found, _)| *found).collect();
         suppress(&mut boxes, &DetectorConfig { iou_threshold, ..DetectorConfig::default() }, out);
         let number = |found: &Detection| self.candidates.iter().find(|(other, _)| other == found).map(|(_, n)| *n);
-        let numbers: Vec<_> = out.iter().map(number).collect();
+        let mut numbers: Vec<_> = out.iter().map(number).collect();
         out.iter_mut().for_each(|found| found.bbox = self.letterbox.to_image(found.bbox, sides));
+        let is_kept = |found: &Detection| found.class < self.class_names.len() && found.bbox.area() > 0.0;
+        let mut kept = out.iter().map(is_kept);
+        numbers.retain(|_| kept.next().unwrap_or_default());
+        out.retain(is_kept);
         // Prototypes are all there is with four dimensions.
         let prototypes = outputs.iter().skip(1).filter_map(|o| floats(Some(o))).find(|(shape, _)| shape.len() == 4);
-        self.mask = prototypes.map(|(whole, prototypes)| {
+        self.objects = prototypes.map(|(whole, prototypes)| {
             let prototypes = Prototypes { values: &prototypes, shape: [whole[1], whole[2], whole[3]] };
-            let mut mask = Image::new(sides[0], sides[1]);
-            for (found, n) in out.iter().zip(&numbers) {
+            let mut objects = Image::new(sides[0], sides[1]);
+            for ((found, n), mark) in out.iter().zip(&numbers).zip(1..=u16::MAX) {
                 let coefficients = n.map(|n| self.layout.coefficients(&shape, &values, n, whole[1]));
-                prototypes.draw(&coefficients.unwrap_or_default(), found, &self.letterbox, &mut mask);
+                prototypes.draw(&coefficients.unwrap_or_default(), &found.bbox, &self.letterbox, mark, &mut objects);
             }
-            mask
+            objects
         });
-        out.retain(|found| found.class < self.class_names.len() && found.bbox.area() > 0.0);
+        self.mask = self.objects.as_ref().map(|objects| masks::classes(objects, out));
         Ok(())
     }
 
     fn mask(&self) -> Option<&Image<u8>> {
         self.mask.as_ref()
+    }
+}
+
+impl Network for AnyYolo {
+    fn objects(&self) -> Option<&Image<u16>> {
+        self.objects.as_ref()
     }
 }
 

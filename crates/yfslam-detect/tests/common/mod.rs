@@ -7,6 +7,7 @@
 )]
 
 mod onnx;
+pub mod other;
 mod reference;
 
 use std::collections::BTreeMap;

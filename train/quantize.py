@@ -1,0 +1,156 @@
+"""What 8-bit integers would cost an exported network: rounds weights and activations as integer arithmetic would, and evaluates.
+
+    python -m train.quantize RUNS/persons person.onnx
+
+Weights: symmetric, a scale for each output channel. What enters a convolution: unsigned, a scale and an offset for each tensor, from
+pictures that were trained on (Krishnamoorthi, Quantizing deep convolutional networks for efficient inference, arXiv 1806.08342). Sums are kept
+exact, as those of 32-bit integers are, and tensors that no convolution reads are not rounded: an implementation can be as good, not better.
+"""
+
+import argparse
+import copy
+import pathlib
+import tempfile
+
+import numpy as np
+import onnx
+import onnxruntime
+from onnx import helper, numpy_helper
+
+from .data import Cache
+from .decode import blob
+from .evaluate import Network, held_out
+
+BINS, LEVELS, PERCENTILE = 2048, 255, 99.99
+VARIANTS = {  # name: (range of activations, kinds of convolution left in float)
+    "as it is": (None, ("first", "last", "depthwise", "1x1")),
+    "weights alone": (None, ()),
+    "all, min and max": ("whole", ()),
+    f"all, percentile {PERCENTILE}": ("percentile", ()),
+    "all, least square error": ("square", ()),
+    "but first and last, percentile": ("percentile", ("first", "last")),
+    "but first and last, square error": ("square", ("first", "last")),
+    "1x1 but last alone, percentile": ("percentile", ("first", "last", "depthwise")),
+    "1x1 but last alone, square error": ("square", ("first", "last", "depthwise")),
+}
+
+
+def plain(model):
+    """The network with float32 weights, whatever they are stored as."""
+    stored = {tensor.name: tensor for tensor in model.graph.initializer}
+    for node in [node for node in model.graph.node if node.op_type == "Cast" and node.input[0] in stored]:
+        values = numpy_helper.to_array(stored[node.input[0]]).astype(np.float32)
+        stored[node.input[0]].CopyFrom(numpy_helper.from_array(values, node.output[0]))
+        model.graph.node.remove(node)
+    return model
+
+
+def kind(node, graph, weights):
+    """What the convolution is: first, last, depthwise or 1x1."""
+    shape = weights[node.input[1]].shape
+    if node.input[0] == graph.input[0].name:
+        return "first"
+    if node.output[0] in {output.name for output in graph.output}:
+        return "last"
+    return "1x1" if shape[2:] == (1, 1) else "depthwise"
+
+
+def work(model):
+    """Share of the multiply-adds by kind of convolution."""
+    graph = onnx.shape_inference.infer_shapes(model).graph
+    weights = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
+    shapes = {v.name: v.type.tensor_type.shape.dim for v in [*graph.value_info, *graph.output]}
+    total = dict.fromkeys(("first", "1x1", "depthwise", "last"), 0)
+    for node in graph.node:
+        if node.op_type == "Conv":
+            total[kind(node, graph, weights)] += weights[node.input[1]].size * shapes[node.output[0]][2].dim_value ** 2
+    return {name: count / sum(total.values()) for name, count in total.items()}
+
+
+def collect(model, names, pictures):
+    """For each tensor its least and greatest value over the pictures, and the histogram between them."""
+    model = copy.deepcopy(model)
+    known = {output.name for output in model.graph.output}
+    model.graph.output.extend(onnx.ValueInfoProto(name=name) for name in names if name not in known)
+    session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
+    feed = session.get_inputs()[0].name
+    run = lambda picture: session.run(names, {feed: blob(picture)})
+    ends = [np.array([[values.min(), values.max()] for values in run(picture)]) for picture in pictures]
+    low, high = np.minimum(np.min(ends, 0)[:, 0], 0), np.maximum(np.max(ends, 0)[:, 1], 1e-6)
+    counts = np.zeros((len(names), BINS))
+    for picture in pictures:
+        for index, values in enumerate(run(picture)):
+            counts[index] += np.histogram(values, BINS, (low[index], high[index]))[0]
+    return {name: (low[index], high[index], counts[index]) for index, name in enumerate(names)}
+
+
+def interval(how, low, high, counts):
+    """The values that are told apart; what lies beside becomes the nearest. 0 is always one of them, margins are."""
+    middles = low + (np.arange(BINS) + 0.5) * (high - low) / BINS
+    if how == "percentile":
+        share, tail = counts.cumsum() / counts.sum(), 1 - PERCENTILE / 100
+        inside = middles[(share > tail) & (share <= 1 - tail)]
+        low, high = min(inside.min(), 0), inside.max()
+    if how == "square":
+        error = lambda part: (counts * (rounded(middles, *scale(low * part, high * part)) - middles) ** 2).sum()
+        best = min(np.linspace(0.1, 1, 91), key=error)
+        low, high = low * best, high * best
+    return low, high
+
+
+def scale(low, high):
+    step = np.float32((high - low) / LEVELS)
+    return step, np.uint8(np.clip(round(-low / step), 0, LEVELS))
+
+
+def rounded(values, step, zero):
+    return (np.clip(np.rint(values / step) + float(zero), 0, LEVELS) - float(zero)) * step
+
+
+def quantized(model, ranges, how, left):
+    """The network with rounded weights, and rounding before each convolution that is not of a kind in `left`."""
+    model = copy.deepcopy(model)
+    graph = model.graph
+    stored = {tensor.name: tensor for tensor in graph.initializer}
+    weights = {name: numpy_helper.to_array(tensor) for name, tensor in stored.items()}
+    nodes, made = [], {}
+    for node in graph.node:
+        if node.op_type == "Conv" and kind(node, graph, weights) not in left:
+            source, name = node.input[0], node.input[1]
+            step = np.abs(weights[name]).max((1, 2, 3), keepdims=True) / 127 + 1e-12
+            stored[name].CopyFrom(numpy_helper.from_array((np.rint(weights[name] / step) * step).astype(np.float32), name))
+            if source not in made and how:
+                step, zero = scale(*interval(how, *ranges[source]))
+                made[source] = source + "_rounded"
+                graph.initializer.extend(numpy_helper.from_array(np.array(v), source + part) for part, v in (("_step", step), ("_zero", zero)))
+                about = [source + "_step", source + "_zero"]
+                nodes.append(helper.make_node("QuantizeLinear", [source, *about], [source + "_integer"]))
+                nodes.append(helper.make_node("DequantizeLinear", [source + "_integer", *about], [made[source]]))
+            node.input[0] = made.get(source, source)
+        nodes.append(node)
+    graph.CopyFrom(helper.make_graph(nodes, graph.name, graph.input, graph.output, graph.initializer))
+    return model
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cache", type=pathlib.Path)
+    parser.add_argument("model", type=pathlib.Path)
+    parser.add_argument("--pictures", type=int, default=300, help="from which the ranges of activations are taken")
+    options = parser.parse_args()
+    learnt, cache = Cache(options.cache, ["person"]), Cache(options.cache, ["person"], held_out=True)
+    chosen = np.sort(np.random.default_rng(0).choice(learnt.chosen, options.pictures, replace=False))
+    model = plain(onnx.load(options.model))
+    print("multiply-adds:", " ".join(f"{name} {share:.3f}" for name, share in work(model).items()))
+    read = dict.fromkeys(node.input[0] for node in model.graph.node if node.op_type == "Conv")
+    ranges = collect(model, list(read), [np.array(learnt.images[i]) for i in chosen])
+    for name, (how, left) in VARIANTS.items():
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder, "changed.onnx")
+            onnx.save(quantized(model, ranges, how, left), path)
+            row = held_out(Network(path), cache)
+        print(f"{name:34}", " ".join(f"{k} {v:.4f}" for k, v in row.items() if isinstance(v, float)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
