@@ -335,6 +335,13 @@ impl BodyMask {
         })
     }
 
+    /// The track whose body a position of the raw image, px, lies on.
+    pub fn body_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
+        let [column, row] = [x, y].map(|v| (v.max(0.0) as usize) / CELL_PX);
+        let owner = *self.owner.get(row * self.columns + column).filter(|_| column < self.columns)?;
+        (owner != 0 && owner != NO_TRACK).then(|| usize::from(owner) - 1)
+    }
+
     /// Cells of a box grown by a share of its size: left, top, right, bottom.
     fn cells(&self, b: &BoundingBox, margin: f32) -> [usize; 4] {
         let (dx, dy) = (margin * (b.x_max - b.x_min), margin * (b.y_max - b.y_min));
