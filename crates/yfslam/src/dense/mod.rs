@@ -3,13 +3,14 @@
 //! ```text
 //! frame ─► piece ──hangs on its keyframe──► mapper ─► volume      occupied, free, unknown; follows every correction
 //!          depth and colour without          │
-//!          edges; what moves is marked       └──► survey ─► cloud, grid, mesh, background
+//!          edges; what moves is marked       └──► survey ─► cloud, grid, mesh, classes, background
 //! ```
 //!
 //! Nothing that moves makes a surface: the dynamic filter's decision is cut into the piece. What it missed is taken back by the views
 //! that come after and see through it.
 
 pub mod background;
+pub mod classes;
 pub mod cloud;
 pub mod grid;
 mod mapper;
@@ -72,6 +73,8 @@ pub struct Survey {
     /// Those of submaps that are not joined with that of most pieces, each in its own world, with its place among all pieces. No product
     /// shows them; they come in when their submap is joined in a later session.
     pub apart: Vec<(usize, SurveyPiece)>,
+    /// Names of the classes that cells may have, from class 1 on; none if no detector looked for things.
+    pub class_names: Vec<String>,
 }
 
 /// A piece in its place.
@@ -96,12 +99,17 @@ impl Survey {
             t_world_cam,
             piece,
         };
-        Self { pieces: pieces.into_iter().enumerate().map(number).collect(), apart: Vec::new(), grid }
+        Self {
+            pieces: pieces.into_iter().enumerate().map(number).collect(),
+            apart: Vec::new(),
+            grid,
+            class_names: Vec::new(),
+        }
     }
 
     /// Bytes of memory that its pieces take.
     pub fn bytes(&self) -> usize {
-        self.pieces.len() * self.grid.rays().len() * Piece::BYTES_PER_CELL
+        self.pieces.iter().map(|one| one.piece.bytes()).sum()
     }
 
     /// The volume of all pieces in a world turned by `turn`. `told` hears how many pieces are done.
