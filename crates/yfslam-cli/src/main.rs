@@ -7,6 +7,7 @@
 mod accuracy;
 mod bench;
 mod boxes;
+mod class_legend;
 mod cli;
 mod command;
 mod cpu;

@@ -1,7 +1,7 @@
 //! Occupancy octrees as OctoMap reads them (Hornung et al., Autonomous Robots 2013; formats as its documentation has them).
 //!
-//! In: voxels with log-odds. Out: `.ot`, which keeps the log-odds, or `.bt`, which keeps free or occupied. Eight leaves that say the same
-//! become one.
+//! In: voxels with log-odds. Out: `.ot`, which keeps the log-odds, with colours or without, or `.bt`, which keeps free or occupied. Eight
+//! leaves that say the same become one.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -19,6 +19,8 @@ pub struct OctreeVoxel {
     pub voxel: [i32; 3],
     /// Log-odds of its being occupied.
     pub log_odds: f32,
+    /// Red, green, blue; for [`OctreeFormat::Colors`] alone.
+    pub color: [u8; 3],
 }
 
 /// What a file keeps.
@@ -28,6 +30,8 @@ pub enum OctreeFormat {
     Binary,
     /// `.ot`: log-odds.
     LogOdds,
+    /// `.ot` as a `ColorOcTree`: log-odds and colours.
+    Colors,
 }
 
 /// How many nodes a file has.
@@ -39,11 +43,14 @@ pub struct OctreeSize {
     pub leaves: usize,
 }
 
+/// What is known of a node: its log-odds, and its colour where the format has any.
+type Known = (f32, [u8; 3]);
+
 /// A node with what hangs below it.
 enum Node {
-    Leaf(f32),
-    /// Greatest log-odds below, and the children: x is bit 0 of their number, y bit 1, z bit 2.
-    Inner(f32, Box<[Option<Node>; 8]>),
+    Leaf(Known),
+    /// Greatest log-odds and mean colour below, and the children: x is bit 0 of their number, y bit 1, z bit 2.
+    Inner(Known, Box<[Option<Node>; 8]>),
 }
 
 /// Writes voxels as an octree.
@@ -59,22 +66,18 @@ pub fn write_octomap(
     let mut size = OctreeSize::default();
     write_atomically(path, |writer| {
         let mut coded = Vec::new();
-        for OctreeVoxel { voxel, log_odds } in voxels {
+        for OctreeVoxel { voxel, log_odds, color } in voxels {
             let code = code_of(voxel).ok_or_else(|| {
                 io::Error::new(io::ErrorKind::InvalidData, format!("voxel {voxel:?} is too far from the origin"))
             })?;
             // A binary tree keeps which side of even odds, and is pruned accordingly.
-            let log_odds = match format {
-                OctreeFormat::Binary => {
-                    if log_odds > 0.0 {
-                        1.0
-                    } else {
-                        -1.0
-                    }
-                }
-                OctreeFormat::LogOdds => log_odds,
+            let known = match format {
+                OctreeFormat::Binary if log_odds > 0.0 => (1.0, [0; 3]),
+                OctreeFormat::Binary => (-1.0, [0; 3]),
+                OctreeFormat::LogOdds => (log_odds, [0; 3]),
+                OctreeFormat::Colors => (log_odds, color),
             };
-            coded.push((code, log_odds));
+            coded.push((code, known));
         }
         coded.sort_unstable_by_key(|(code, _)| *code);
         coded.dedup_by_key(|(code, _)| *code);
@@ -85,11 +88,13 @@ pub fn write_octomap(
         let (title, id) = match format {
             OctreeFormat::Binary => ("# Octomap OcTree binary file", "OcTree"),
             OctreeFormat::LogOdds => ("# Octomap OcTree file", "OcTree"),
+            OctreeFormat::Colors => ("# Octomap OcTree file", "ColorOcTree"),
         };
         write!(writer, "{title}\n#\nid {id}\nsize {}\nres {resolution_m}\ndata\n", size.nodes)?;
         match (&root, format) {
             (None, _) => Ok(()),
-            (Some(root), OctreeFormat::LogOdds) => root.write_log_odds(writer),
+            (Some(root), OctreeFormat::LogOdds) => root.write(false, writer),
+            (Some(root), OctreeFormat::Colors) => root.write(true, writer),
             (Some(Node::Inner(_, children)), OctreeFormat::Binary) => write_binary(children, writer),
             // The format has no way to say that the whole world is alike.
             (Some(Node::Leaf(_)), OctreeFormat::Binary) => Ok(()),
@@ -112,9 +117,9 @@ fn code_of(voxel: [i32; 3]) -> Option<u64> {
 
 impl Node {
     /// The node over voxels in the order of their codes, `level` levels above them.
-    fn of(voxels: &[(u64, f32)], level: u32) -> Self {
+    fn of(voxels: &[(u64, Known)], level: u32) -> Self {
         if level == 0 {
-            return Self::Leaf(voxels.first().map_or(0.0, |(_, log_odds)| *log_odds));
+            return Self::Leaf(voxels.first().map_or_else(Known::default, |(_, known)| *known));
         }
         let shift = 3 * (level - 1);
         let mut rest = voxels;
@@ -126,22 +131,25 @@ impl Node {
             rest = others;
         }
         let first = match &children[0] {
-            Some(Self::Leaf(log_odds)) => Some(*log_odds),
+            Some(Self::Leaf(known)) => Some(*known),
             _ => None,
         };
         let alike = |child: &Option<Self>| matches!((child, first), (Some(Self::Leaf(a)), Some(b)) if *a == b);
         match first {
-            Some(log_odds) if children.iter().all(alike) => Self::Leaf(log_odds),
+            Some(known) if children.iter().all(alike) => Self::Leaf(known),
             _ => {
-                let most = children.iter().flatten().map(Self::log_odds).fold(f32::NEG_INFINITY, f32::max);
-                Self::Inner(most, Box::new(children))
+                let known = || children.iter().flatten().map(Self::known);
+                let most = known().map(|(log_odds, _)| log_odds).fold(f32::NEG_INFINITY, f32::max);
+                let mean =
+                    |axis: usize| known().map(|(_, rgb)| usize::from(rgb[axis])).sum::<usize>() / known().count();
+                Self::Inner((most, [0, 1, 2].map(|axis| mean(axis) as u8)), Box::new(children))
             }
         }
     }
 
-    fn log_odds(&self) -> f32 {
+    fn known(&self) -> Known {
         match self {
-            Self::Leaf(log_odds) | Self::Inner(log_odds, _) => *log_odds,
+            Self::Leaf(known) | Self::Inner(known, _) => *known,
         }
     }
 
@@ -153,13 +161,17 @@ impl Node {
         }
     }
 
-    /// Log-odds, then a bit for each child, then the children.
-    fn write_log_odds(&self, writer: &mut dyn Write) -> io::Result<()> {
-        writer.write_all(&self.log_odds().to_le_bytes())?;
+    /// Log-odds, perhaps the colour, then a bit for each child, then the children.
+    fn write(&self, with_color: bool, writer: &mut dyn Write) -> io::Result<()> {
+        let (log_odds, color) = self.known();
+        writer.write_all(&log_odds.to_le_bytes())?;
+        if with_color {
+            writer.write_all(&color)?;
+        }
         let Self::Inner(_, children) = self else { return writer.write_all(&[0]) };
         let bits = (0..8).filter(|&number| children[number].is_some()).fold(0u8, |bits, number| bits | 1 << number);
         writer.write_all(&[bits])?;
-        children.iter().flatten().try_for_each(|child| child.write_log_odds(writer))
+        children.iter().flatten().try_for_each(|child| child.write(with_color, writer))
     }
 }
 
@@ -168,7 +180,7 @@ fn write_binary(children: &[Option<Node>; 8], writer: &mut dyn Write) -> io::Res
     let word = children.iter().enumerate().fold(0u16, |word, (number, child)| {
         let says = match child {
             None => 0,
-            Some(Node::Leaf(log_odds)) if *log_odds > 0.0 => 2,
+            Some(Node::Leaf((log_odds, _))) if *log_odds > 0.0 => 2,
             Some(Node::Leaf(_)) => 1,
             Some(Node::Inner(..)) => 3,
         };

@@ -116,6 +116,11 @@ impl DenseMapper {
         Ok(self)
     }
 
+    /// The cells of its pieces.
+    pub fn grid(&self) -> &CellGrid {
+        &self.grid
+    }
+
     /// Whether a keyframe tells enough beyond the last piece to become one.
     pub fn is_due(&self, timestamp_ns: i64, t_world_cam: &Pose) -> bool {
         let Some((last_ns, last)) = &self.last else { return true };
