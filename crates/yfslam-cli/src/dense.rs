@@ -91,7 +91,7 @@ impl DenseRun {
             let moving = slam.moving_mask(&frame.depth);
             let moves = |at, edge| moving.covers(&frame.depth, at, edge);
             let mut piece = self.mapper.cut(&frame.color, &frame.depth, moves);
-            if let Some((ids, things)) = self.class_ids.as_ref().zip(slam.things(&frame.depth)) {
+            if let Some((ids, things)) = self.class_ids.as_ref().zip(slam.things(&frame.depth, &moving)) {
                 let id = |at| things.class_at(at).and_then(|class| ids.get(class).copied()).unwrap_or_default();
                 piece = piece.with_classes(self.mapper.grid(), id);
             }

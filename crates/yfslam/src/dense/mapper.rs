@@ -443,6 +443,19 @@ mod tests {
     }
 
     #[test]
+    fn classes_keep_their_numbers_when_a_later_session_has_another_detector() {
+        let (map, _) = map();
+        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let mut first = mapper(Execution::Inline);
+        assert_eq!(first.name_classes(&names(&["person", "chair"])), [1, 2]);
+        let mut second = mapper(Execution::Inline).with_pieces(first.into_survey(&map), &map).unwrap();
+        assert_eq!(second.name_classes(&names(&["chair", "tv", "person"])), [2, 3, 1]);
+        assert_eq!(second.into_survey(&map).class_names, ["person", "chair", "tv"]);
+        let many: Vec<String> = (0..300).map(|class| class.to_string()).collect();
+        assert_eq!(mapper(Execution::Inline).name_classes(&many)[253..257], [254, 255, 0, 0]);
+    }
+
+    #[test]
     fn pieces_of_other_cells_or_of_another_map_are_refused() {
         let (map, ties) = map();
         let mut first = mapper(Execution::Inline);

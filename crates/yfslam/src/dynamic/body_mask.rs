@@ -192,10 +192,14 @@ impl BodyMask {
 
     /// Marks the cells whose middle a mask of movable objects covers.
     pub fn mark_mask(&mut self, mask: &Image<u8>) {
+        self.mark_where(|x, y| mask.get(x, y).is_some_and(|number| *number > 0));
+    }
+
+    /// Marks the cells whose middle, px, is said to move.
+    pub fn mark_where(&mut self, moves: impl Fn(usize, usize) -> bool) {
         for (row, line) in self.owner.chunks_mut(self.columns.max(1)).enumerate() {
-            let y = row * CELL_PX + CELL_PX / 2;
             for (column, owner) in line.iter_mut().enumerate() {
-                if mask.get(column * CELL_PX + CELL_PX / 2, y).is_some_and(|number| *number > 0) {
+                if moves(column * CELL_PX + CELL_PX / 2, row * CELL_PX + CELL_PX / 2) {
                     *owner = NO_TRACK;
                 }
             }

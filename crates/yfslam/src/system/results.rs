@@ -98,11 +98,10 @@ impl Slam {
         self.found.knows_things()
     }
 
-    /// Outlines of what the detector found in the last frame, whose depth image is given, and cannot move. `None` where no detector that
-    /// knows such things looked.
-    pub fn things(&self, depth: &DepthImage) -> Option<Things> {
-        let config = &self.config.dynamic;
-        self.found.things().map(|boxes| Things::outline(config, boxes, depth, &self.last_frame().features))
+    /// Outlines of what the detector found in the last frame and cannot move, beside what does, as [`Slam::moving_mask`] has it of the
+    /// same depth image. `None` where no detector that knows such things looked.
+    pub fn things(&self, depth: &DepthImage, moving: &MovingMask) -> Option<Things> {
+        self.found.things().map(|boxes| Things::outline(&self.config.dynamic, boxes, depth, moving))
     }
 
     /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
