@@ -8,11 +8,11 @@ use clap::Args;
 use nalgebra::{UnitQuaternion, Vector3};
 use yfslam::dense::background::{Background, background};
 use yfslam::dense::classes::{Classes, classes};
-use yfslam::dense::cloud::{CloudPoint, cloud};
+use yfslam::dense::cloud::{self, CloudPoint, cloud};
 use yfslam::dense::grid::{GridCell, ground_grid};
-use yfslam::dense::mesh::mesh;
+use yfslam::dense::mesh::{self, mesh};
 use yfslam::dense::persist::decode;
-use yfslam::dense::{DenseConfig, KnownVoxel, Survey, Volume, up};
+use yfslam::dense::{DenseConfig, KnownVoxel, Survey, Volume, check_memory, up};
 use yfslam::image::{Image, RgbImage};
 use yfslam_io::write::{
     Labels, OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png, write_nav2,
@@ -166,7 +166,8 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     let turn = args.turn(&survey);
     let started = Instant::now();
     let (volume, cpu) =
-        cpu::timed(|| with_progress(terminal, "occupancy", &survey, |told| survey.volume(&config, &turn, told)));
+        cpu::timed(|| with_progress(terminal, "occupancy", &survey, |told| survey.volume_within(&config, &turn, told)));
+    let volume = volume?;
     let took = cpu.unwrap_or_else(|| started.elapsed());
     let mut text = describe(&volume, took.as_secs_f64() * 1e3 / survey.pieces.len() as f64);
     let floor_m = args.floor.or(up::floor_m(&survey, &turn).map(|floor| floor as f32)).unwrap_or_default();
@@ -174,8 +175,18 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     let classes = (!survey.class_names.is_empty()).then(|| with_progress(terminal, "classes", &survey, find));
     let maker = Maker { survey: &survey, volume, classes, floor_m, folder, terminal };
     text += &format!("floor: {:.2} m below the first camera\n", first_height_m(&survey, &turn) - floor_m);
-    text += &maker.legend()?;
     let all = !(args.cloud || args.octomap || args.grid || args.mesh || args.background);
+    // Nothing is written if something cannot be.
+    for (wanted, what, bytes) in [
+        (args.cloud, "the cloud", cloud::bytes as fn(&Volume) -> usize),
+        (args.octomap, "the octree", octree_bytes),
+        (args.mesh, "the mesh", mesh::bytes),
+    ] {
+        if wanted || all {
+            check_memory(&config, what, bytes(&maker.volume))?;
+        }
+    }
+    text += &maker.legend()?;
     if args.cloud || all {
         text += &maker.cloud()?;
     }
@@ -337,6 +348,11 @@ fn write_view(folder: &Path, name: &str, seen: &RgbImage, view: &Background) -> 
     let mask = view.valid.data().iter().map(|valid| if *valid { 255 } else { 0 }).collect();
     let mask = Image::from_vec(width, height, mask).unwrap_or_default();
     Ok(write_mask_png(&folder.join(format!("{name}-valid.png")), &mask)?)
+}
+
+/// Bytes of memory that an octree takes while it is written: a voxel and its share of the nodes.
+fn octree_bytes(volume: &Volume) -> usize {
+    32 * volume.voxels().count()
 }
 
 /// Height of the first camera, m.
