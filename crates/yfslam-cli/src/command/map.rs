@@ -162,7 +162,8 @@ struct Maker<'a> {
 pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     let config = args.config()?;
     let (survey, folder) = args.open()?;
-    terminal.note(&format!("{} pieces; {}", survey.pieces.len(), memory_bound(&config, &survey)));
+    let (pieces, mb) = (survey.pieces.len(), survey.bytes() as f64 / 1e6);
+    terminal.note(&format!("{pieces} pieces of {mb:.0} MB; {}", memory_bound(&config, &survey)));
     let turn = args.turn(&survey);
     let started = Instant::now();
     let (volume, cpu) =
@@ -177,11 +178,9 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     text += &format!("floor: {:.2} m below the first camera\n", first_height_m(&survey, &turn) - floor_m);
     let all = !(args.cloud || args.octomap || args.grid || args.mesh || args.background);
     // Nothing is written if something cannot be.
-    for (wanted, what, bytes) in [
-        (args.cloud, "the cloud", cloud::bytes as fn(&Volume) -> usize),
-        (args.octomap, "the octree", octree_bytes),
-        (args.mesh, "the mesh", mesh::bytes),
-    ] {
+    for (wanted, what, bytes) in
+        [(args.cloud, "the cloud", cloud::bytes as fn(&Volume) -> usize), (args.mesh, "the mesh", mesh::bytes)]
+    {
         if wanted || all {
             check_memory(&config, what, bytes(&maker.volume))?;
         }
@@ -280,13 +279,15 @@ impl Maker<'_> {
             _ => FREE,
         };
         let tree = |v: KnownVoxel| OctreeVoxel { voxel: v.voxel, log_odds: v.log_odds, color: color(&v) };
-        let voxels = || self.volume.voxels().map(tree);
-        let binary = write_octomap(&self.folder.join("octomap.bt"), resolution, voxels(), OctreeFormat::Binary)?;
-        let full = write_octomap(&self.folder.join("octomap.ot"), resolution, voxels(), OctreeFormat::LogOdds)?;
+        let write = |name: &str, format| {
+            let voxels = |block| self.volume.voxels_in(block).map(tree);
+            write_octomap(&self.folder.join(name), resolution, self.volume.blocks(), voxels, format)
+        };
+        let binary = write("octomap.bt", OctreeFormat::Binary)?;
+        let full = write("octomap.ot", OctreeFormat::LogOdds)?;
         let mut text = format!("octomap: {} nodes in octomap.bt, {} in octomap.ot", binary.nodes, full.nodes);
         if self.classes.is_some() {
-            let path = self.folder.join("semantic.ot");
-            let semantic = write_octomap(&path, resolution, voxels(), OctreeFormat::Colors)?;
+            let semantic = write("semantic.ot", OctreeFormat::Colors)?;
             text += &format!(", {} in semantic.ot", semantic.nodes);
         }
         Ok(text + "\n")
@@ -350,11 +351,6 @@ fn write_view(folder: &Path, name: &str, seen: &RgbImage, view: &Background) -> 
     Ok(write_mask_png(&folder.join(format!("{name}-valid.png")), &mask)?)
 }
 
-/// Bytes of memory that an octree takes while it is written: a voxel and its share of the nodes.
-fn octree_bytes(volume: &Volume) -> usize {
-    32 * volume.voxels().count()
-}
-
 /// Height of the first camera, m.
 fn first_height_m(survey: &Survey, turn: &UnitQuaternion<f64>) -> f32 {
     survey.pieces.first().map_or(0.0, |one| (turn * one.t_world_cam).translation.z) as f32
@@ -385,6 +381,8 @@ fn describe(volume: &Volume, each_ms: f64) -> String {
 
 /// How much memory the map can take at most: by extent, resolution and number of pieces.
 fn memory_bound(config: &DenseConfig, survey: &Survey) -> String {
-    let bound = Volume::bytes_at_most(config, survey);
-    format!("at {} m the map takes {:.0} MB at most", config.resolution_m, bound as f64 / 1e6)
+    let bound_mb = Volume::bytes_at_most(config, survey).div_ceil(1_000_000);
+    let allowed_mb = config.max_memory_mb;
+    let map_mb = bound_mb.min(allowed_mb);
+    format!("at {} m the map takes {map_mb} MB at most, and a product {allowed_mb} MB beside it", config.resolution_m)
 }
