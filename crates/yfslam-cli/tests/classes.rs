@@ -7,15 +7,19 @@
     reason = "a test may, and it uses a part of what it shares"
 )]
 
+mod common;
 #[path = "../examples/dense/judge.rs"]
 mod judge;
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::sync::{Arc, Mutex};
 
+use common::succeeds;
 use judge::{index_of, t_survey_world};
 use nalgebra::{Isometry3, Point3};
 use yfslam::dense::classes::classes;
+use yfslam::dense::persist::encode;
 use yfslam::dense::voxels::{Voxel, voxel_at};
 use yfslam::dense::{DenseConfig, DenseMapper, Survey, Volume, up};
 use yfslam::image::RgbImage;
@@ -113,6 +117,8 @@ fn a_box_that_stands_among_walkers_is_named_and_little_else_also_if_it_is_missed
     println!("{named} of {stands} voxels named, {beyond} beyond, {others} with another name");
     assert!(stands > 100 && named * 100 >= stands * 95 && beyond * 20 <= stands && others == 0);
 
+    products_tell_them(&survey);
+
     for one in survey.pieces.iter_mut().skip(1).step_by(2) {
         one.piece = one.piece.clone().with_classes(&survey.grid, |_| 0);
     }
@@ -121,4 +127,25 @@ fn a_box_that_stands_among_walkers_is_named_and_little_else_also_if_it_is_missed
         "missed in half of the views: {named} of {stands} voxels named, {beyond} beyond, {others} with another name"
     );
     assert!(named * 4 >= stands * 3 && beyond * 20 <= stands && others == 0);
+}
+
+/// `yfslam map` names them in all products that can, and says how many there are.
+fn products_tell_them(survey: &Survey) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("dense.map"), encode(survey).unwrap()).unwrap();
+    let said = succeeds(folder.path(), &["map", "dense.map", "--cloud", "--octomap", "--out", "out"]).stdout;
+    assert!(said.contains("classes, in voxels: box 1"), "{said}");
+    let read = |name: &str| fs::read(folder.path().join("out").join(name)).unwrap();
+    let head = |name: &str| String::from_utf8_lossy(&read(name)[..500]).into_owned();
+    assert!(
+        head("cloud.ply").contains("comment class 4 box\n") && head("cloud.ply").contains("property uchar class\n")
+    );
+    assert!(head("cloud.pcd").contains("FIELDS x y z rgb label\n"));
+    assert!(head("semantic.ot").contains("id ColorOcTree\n"));
+    assert!(read("classes.png").len() > 1000);
+    let legend: serde_json::Value = serde_json::from_slice(&read("classes.json")).unwrap();
+    let entry = &legend["classes"][0];
+    assert_eq!((entry["class"].as_u64(), entry["name"].as_str()), (Some(4), Some("box")));
+    let named = entry["voxels"].as_u64().unwrap();
+    assert!(said.contains(&format!("box {named}; {} unknown", legend["unknown"])), "{said}\n{legend}");
 }
