@@ -28,6 +28,8 @@ const PICTURE_PX: [usize; 2] = [480, 360];
 /// The dense map in the making.
 pub struct DenseRun {
     mapper: DenseMapper,
+    /// The class in pieces of each class of the detector; `None` where pieces have none.
+    class_ids: Option<Vec<u8>>,
     resets: usize,
     /// Pieces cut, and the processor time of this thread for them and for following the map.
     pieces: u32,
@@ -65,7 +67,9 @@ impl DenseRun {
             mapper =
                 mapper.with_pieces(earlier, slam.map()).context("the dense pieces of the loaded map do not fit")?;
         }
-        Ok(Self { mapper, resets: 0, pieces: 0, cpu: Some(Duration::ZERO) })
+        let names_things = config.classes && slam.knows_things();
+        let class_ids = names_things.then(|| mapper.name_classes(slam.class_names()));
+        Ok(Self { mapper, class_ids, resets: 0, pieces: 0, cpu: Some(Duration::ZERO) })
     }
 
     /// Takes note of the frame that the pipeline saw last: if it became a keyframe, its piece is cut, and all pieces follow the map.
@@ -86,7 +90,11 @@ impl DenseRun {
             let started = Instant::now();
             let moving = slam.moving_mask(&frame.depth);
             let moves = |at, edge| moving.covers(&frame.depth, at, edge);
-            let piece = self.mapper.cut(&frame.color, &frame.depth, moves);
+            let mut piece = self.mapper.cut(&frame.color, &frame.depth, moves);
+            if let Some((ids, things)) = self.class_ids.as_ref().zip(slam.things(&frame.depth, &moving)) {
+                let id = |at| things.class_at(at).and_then(|class| ids.get(class).copied()).unwrap_or_default();
+                piece = piece.with_classes(self.mapper.grid(), id);
+            }
             let cut = started.elapsed();
             self.mapper.hang(frame.timestamp_ns, tie, piece, slam.map());
             [cut, started.elapsed() - cut]

@@ -8,6 +8,7 @@ mod accuracy;
 mod apart;
 mod bench;
 mod boxes;
+mod class_legend;
 mod cli;
 mod command;
 mod cpu;

@@ -65,7 +65,7 @@ impl OutputFolder {
         write_trajectory(&self.0.join("trajectory.txt"), &outcome.trajectory)?;
         write_trajectory(&self.0.join("keyframes.txt"), &outcome.keyframes)?;
         write_trajectory(&self.0.join("live.txt"), &outcome.live)?;
-        write_ply(&self.0.join("map.ply"), outcome.landmarks.iter().copied())?;
+        write_ply(&self.0.join("map.ply"), outcome.landmarks.iter().copied(), None)?;
         let toml = config.to_commented_toml()?;
         Ok(write_atomically(&self.0.join("config.toml"), |file| file.write_all(toml.as_bytes()))?)
     }

@@ -22,7 +22,7 @@ pub struct Kind {
 /// Keyframes and landmarks, by which a camera finds where it is.
 pub const MAP: Kind = Kind { magic: "yfslam map", version: 1 };
 /// Pieces of a dense map, of which products are made.
-pub const PIECES: Kind = Kind { magic: "yfslam dense map", version: 2 };
+pub const PIECES: Kind = Kind { magic: "yfslam dense map", version: 3 };
 
 /// Why bytes cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -7,17 +7,20 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use nalgebra::{UnitQuaternion, Vector3};
 use yfslam::dense::background::{Background, Backgrounds};
-use yfslam::dense::cloud::{CloudPoint, cloud};
+use yfslam::dense::classes::{Classes, classes};
+use yfslam::dense::cloud::{self, CloudPoint, cloud};
 use yfslam::dense::grid::{GridCell, ground_grid};
-use yfslam::dense::mesh::mesh;
+use yfslam::dense::mesh::{self, mesh};
 use yfslam::dense::persist::decode;
-use yfslam::dense::{DenseConfig, Survey, Volume, up};
+use yfslam::dense::{DenseConfig, KnownVoxel, Survey, Volume, check_memory, up};
 use yfslam::image::{Image, RgbImage};
 use yfslam_io::write::{
-    OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png, write_nav2, write_octomap,
-    write_pcd, write_ply, write_ply_mesh,
+    Labels, OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png, write_nav2,
+    write_octomap, write_pcd, write_ply, write_ply_mesh,
 };
+use yfslam_io::write_atomically;
 
+use crate::class_legend::{ClassLegend, FREE, color_of};
 use crate::cpu;
 use crate::dense::DENSE_FILE;
 use crate::dense_picture::{SHOWN_M, from_above, from_corner};
@@ -41,6 +44,12 @@ In the output folder:
   mesh.ply                  with --mesh, coloured triangles
   background/               with --background, the keyframes with most people, as seen and without them, with depth (1/5000 m) and
                             a mask of what is known
+
+If the run's detector knew more than what can move (`--detector` with the 80 classes of COCO, for example), the map knows what it shows:
+  cloud.ply, cloud.pcd      have the class of each point, 0 where it is unknown
+  classes.png               with --cloud, the picture from a corner, coloured by class
+  semantic.ot               with --octomap, the octree coloured by class
+  classes.json              the classes' numbers, names, colours, and how many voxels are of each
 
 The z-axis points up, x to the front of the first picture, y to its left (ROS, REP 103).";
 
@@ -142,6 +151,8 @@ impl std::str::FromStr for Up {
 struct Maker<'a> {
     survey: &'a Survey,
     volume: Volume,
+    /// What voxels show; `None` where no detector told.
+    classes: Option<Classes>,
     /// Height of the floor.
     floor_m: f32,
     folder: PathBuf,
@@ -151,17 +162,30 @@ struct Maker<'a> {
 pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     let config = args.config()?;
     let (survey, folder) = args.open()?;
-    terminal.note(&format!("{} pieces; {}", survey.pieces.len(), memory_bound(&config, &survey)));
+    let (pieces, mb) = (survey.pieces.len(), survey.bytes() as f64 / 1e6);
+    terminal.note(&format!("{pieces} pieces of {mb:.0} MB; {}", memory_bound(&config, &survey)));
     let turn = args.turn(&survey);
     let started = Instant::now();
     let (volume, cpu) =
-        cpu::timed(|| with_progress(terminal, "occupancy", &survey, |told| survey.volume(&config, &turn, told)));
+        cpu::timed(|| with_progress(terminal, "occupancy", &survey, |told| survey.volume_within(&config, &turn, told)));
+    let volume = volume?;
     let took = cpu.unwrap_or_else(|| started.elapsed());
     let mut text = describe(&volume, took.as_secs_f64() * 1e3 / survey.pieces.len() as f64);
     let floor_m = args.floor.or(up::floor_m(&survey, &turn).map(|floor| floor as f32)).unwrap_or_default();
-    let maker = Maker { survey: &survey, volume, floor_m, folder, terminal };
+    let find = |told: &mut dyn FnMut(usize)| classes(&survey, &volume, told);
+    let classes = (!survey.class_names.is_empty()).then(|| with_progress(terminal, "classes", &survey, find));
+    let maker = Maker { survey: &survey, volume, classes, floor_m, folder, terminal };
     text += &format!("floor: {:.2} m below the first camera\n", first_height_m(&survey, &turn) - floor_m);
     let all = !(args.cloud || args.octomap || args.grid || args.mesh || args.background);
+    // Nothing is written if something cannot be.
+    for (wanted, what, bytes) in
+        [(args.cloud, "the cloud", cloud::bytes as fn(&Volume) -> usize), (args.mesh, "the mesh", mesh::bytes)]
+    {
+        if wanted || all {
+            check_memory(&config, what, bytes(&maker.volume))?;
+        }
+    }
+    text += &maker.legend()?;
     if args.cloud || all {
         text += &maker.cloud()?;
     }
@@ -217,25 +241,56 @@ impl Maker<'_> {
         let told = |told: &mut dyn FnMut(usize)| cloud(self.survey, &self.volume, told);
         let points = with_progress(self.terminal, "cloud", self.survey, told);
         let ply = |p: &CloudPoint| PlyPoint { position_m: p.position_m, color: p.color };
-        write_ply(&self.folder.join("cloud.ply"), points.iter().map(ply))?;
-        write_pcd(&self.folder.join("cloud.pcd"), points.iter().map(ply))?;
+        let found: Option<Vec<u8>> =
+            self.classes.as_ref().map(|classes| points.iter().map(|p| classes.get(p.voxel)).collect());
+        let labels = found.as_ref().map(|classes| Labels { classes, names: &self.survey.class_names });
+        write_ply(&self.folder.join("cloud.ply"), points.iter().map(ply), labels)?;
+        write_pcd(&self.folder.join("cloud.pcd"), points.iter().map(ply), labels)?;
         let resolution_m = self.volume.config().resolution_m;
         let cut_m = self.floor_m + SHOWN_M;
         let above = from_above(&points, resolution_m, cut_m, PICTURE_PX);
         write_color_png(&self.folder.join("above.png"), &above)?;
         let corner = from_corner(&points, resolution_m, cut_m, PICTURE_PX);
         write_color_png(&self.folder.join("corner.png"), &corner)?;
+        if let Some(found) = found {
+            let by_class = |(point, class): (&CloudPoint, u8)| CloudPoint { color: color_of(class), ..*point };
+            let points: Vec<CloudPoint> = points.iter().zip(found).map(by_class).collect();
+            let corner = from_corner(&points, resolution_m, cut_m, PICTURE_PX);
+            write_color_png(&self.folder.join("classes.png"), &corner)?;
+        }
         Ok(format!("cloud: {} points\n", points.len()))
+    }
+
+    /// What there is of each class, for whoever opens the other files.
+    fn legend(&self) -> Result<String> {
+        let Some(classes) = &self.classes else { return Ok(String::new()) };
+        let legend = ClassLegend::of(&self.survey.class_names, &self.volume, classes);
+        let json = serde_json::to_vec_pretty(&legend)?;
+        write_atomically(&self.folder.join("classes.json"), |file| file.write_all(&json))?;
+        Ok(legend.to_string())
     }
 
     fn octomap(&self) -> Result<String> {
         let resolution = f64::from(self.volume.config().resolution_m);
         // As the user wrote it, not as a float of 32 bits has it.
         let resolution = (resolution * 1e6).round() / 1e6;
-        let voxels = || self.volume.voxels().map(|v| OctreeVoxel { voxel: v.voxel, log_odds: v.log_odds });
-        let binary = write_octomap(&self.folder.join("octomap.bt"), resolution, voxels(), OctreeFormat::Binary)?;
-        let full = write_octomap(&self.folder.join("octomap.ot"), resolution, voxels(), OctreeFormat::LogOdds)?;
-        Ok(format!("octomap: {} nodes in octomap.bt, {} in octomap.ot\n", binary.nodes, full.nodes))
+        let color = |v: &KnownVoxel| match &self.classes {
+            Some(classes) if v.occupied => color_of(classes.get(v.voxel)),
+            _ => FREE,
+        };
+        let tree = |v: KnownVoxel| OctreeVoxel { voxel: v.voxel, log_odds: v.log_odds, color: color(&v) };
+        let write = |name: &str, format| {
+            let voxels = |block| self.volume.voxels_in(block).map(tree);
+            write_octomap(&self.folder.join(name), resolution, self.volume.blocks(), voxels, format)
+        };
+        let binary = write("octomap.bt", OctreeFormat::Binary)?;
+        let full = write("octomap.ot", OctreeFormat::LogOdds)?;
+        let mut text = format!("octomap: {} nodes in octomap.bt, {} in octomap.ot", binary.nodes, full.nodes);
+        if self.classes.is_some() {
+            let semantic = write("semantic.ot", OctreeFormat::Colors)?;
+            text += &format!(", {} in semantic.ot", semantic.nodes);
+        }
+        Ok(text + "\n")
     }
 
     fn grid(&self, Band(band): Band) -> Result<String> {
@@ -328,6 +383,8 @@ fn describe(volume: &Volume, each_ms: f64) -> String {
 
 /// How much memory the map can take at most: by extent, resolution and number of pieces.
 fn memory_bound(config: &DenseConfig, survey: &Survey) -> String {
-    let bound = Volume::bytes_at_most(config, survey);
-    format!("at {} m the map takes {:.0} MB at most", config.resolution_m, bound as f64 / 1e6)
+    let bound_mb = Volume::bytes_at_most(config, survey).div_ceil(1_000_000);
+    let allowed_mb = config.max_memory_mb;
+    let map_mb = bound_mb.min(allowed_mb);
+    format!("at {} m the map takes {map_mb} MB at most, and a product {allowed_mb} MB beside it", config.resolution_m)
 }

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 pub use nav2::write_nav2;
 pub use octomap::{OctreeFormat, OctreeSize, OctreeVoxel, write_octomap};
 pub use pcd::write_pcd;
-pub use ply::{PlyPoint, write_ply, write_ply_mesh};
+pub use ply::{Labels, PlyPoint, write_ply, write_ply_mesh};
 pub use png::{write_color_png, write_depth_png, write_mask_png};
 pub use recording::{ListedStamps, RecordingWriter};
 

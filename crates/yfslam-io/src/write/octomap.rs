@@ -1,10 +1,13 @@
 //! Occupancy octrees as OctoMap reads them (Hornung et al., Autonomous Robots 2013; formats as its documentation has them).
 //!
-//! In: voxels with log-odds. Out: `.ot`, which keeps the log-odds, or `.bt`, which keeps free or occupied. Eight leaves that say the same
-//! become one.
+//! In: blocks of voxels with log-odds. Out: `.ot`, which keeps the log-odds, with colours or without, or `.bt`, which keeps free or occupied. Eight
+//! leaves that say the same become one. Of the tree only what is above blocks is held in memory: a map of a building in voxels of a
+//! centimetre has hundreds of millions of nodes.
 
 use std::io::{self, Write};
 use std::path::Path;
+
+use yfslam::dense::voxels::{Block, SIDE, Voxel};
 
 use crate::error::Result;
 use crate::write::write_atomically;
@@ -19,6 +22,8 @@ pub struct OctreeVoxel {
     pub voxel: [i32; 3],
     /// Log-odds of its being occupied.
     pub log_odds: f32,
+    /// Red, green, blue; for [`OctreeFormat::Colors`] alone.
+    pub color: [u8; 3],
 }
 
 /// What a file keeps.
@@ -28,6 +33,8 @@ pub enum OctreeFormat {
     Binary,
     /// `.ot`: log-odds.
     LogOdds,
+    /// `.ot` as a `ColorOcTree`: log-odds and colours.
+    Colors,
 }
 
 /// How many nodes a file has.
@@ -39,148 +46,213 @@ pub struct OctreeSize {
     pub leaves: usize,
 }
 
+/// What is known of a node: its log-odds, and its colour where the format has any.
+type Known = (f32, [u8; 3]);
+
 /// A node with what hangs below it.
 enum Node {
-    Leaf(f32),
-    /// Greatest log-odds below, and the children: x is bit 0 of their number, y bit 1, z bit 2.
-    Inner(f32, Box<[Option<Node>; 8]>),
+    Leaf(Known),
+    /// Greatest log-odds and mean colour below, and the children: x is bit 0 of their number, y bit 1, z bit 2.
+    Inner(Known, Box<[Option<Node>; 8]>),
+    /// The same for a block and how many nodes it has; its voxels are asked for again when it is written.
+    Block(Known, Block, OctreeSize),
 }
 
-/// Writes voxels as an octree.
+/// Voxels, block by block, as a format has them.
+struct Blocks<F> {
+    voxels: F,
+    format: OctreeFormat,
+}
+
+/// Writes voxels as an octree. `voxels(block)` gives those in one of `blocks`; it is asked twice for each, so that not all of the tree is
+/// held at once.
 ///
 /// # Errors
 /// The file cannot be written, or a voxel is outside what 16 levels hold: 32768 voxels around the origin.
-pub fn write_octomap(
+pub fn write_octomap<I: Iterator<Item = OctreeVoxel>>(
     path: &Path,
     resolution_m: f64,
-    voxels: impl IntoIterator<Item = OctreeVoxel>,
+    blocks: impl IntoIterator<Item = Block>,
+    voxels: impl Fn(Block) -> I,
     format: OctreeFormat,
 ) -> Result<OctreeSize> {
     let mut size = OctreeSize::default();
     write_atomically(path, |writer| {
-        let mut coded = Vec::new();
-        for OctreeVoxel { voxel, log_odds } in voxels {
-            let code = code_of(voxel).ok_or_else(|| {
-                io::Error::new(io::ErrorKind::InvalidData, format!("voxel {voxel:?} is too far from the origin"))
-            })?;
-            // A binary tree keeps which side of even odds, and is pruned accordingly.
-            let log_odds = match format {
-                OctreeFormat::Binary => {
-                    if log_odds > 0.0 {
-                        1.0
-                    } else {
-                        -1.0
-                    }
-                }
-                OctreeFormat::LogOdds => log_odds,
-            };
-            coded.push((code, log_odds));
+        let below = Blocks { voxels, format };
+        let mut summaries = Vec::new();
+        for block in blocks {
+            if let Some(node) = below.node(block)? {
+                summaries.push((code_of(block.map(|v| v.saturating_mul(SIDE)))?, Some(node.summary(block))));
+            }
         }
-        coded.sort_unstable_by_key(|(code, _)| *code);
-        coded.dedup_by_key(|(code, _)| *code);
-        let root = (!coded.is_empty()).then(|| Node::of(&coded, DEPTH));
+        summaries.sort_unstable_by_key(|(code, _)| *code);
+        let root = Node::above(&mut summaries, DEPTH);
         if let Some(root) = &root {
             root.count(&mut size);
         }
         let (title, id) = match format {
             OctreeFormat::Binary => ("# Octomap OcTree binary file", "OcTree"),
             OctreeFormat::LogOdds => ("# Octomap OcTree file", "OcTree"),
+            OctreeFormat::Colors => ("# Octomap OcTree file", "ColorOcTree"),
         };
         write!(writer, "{title}\n#\nid {id}\nsize {}\nres {resolution_m}\ndata\n", size.nodes)?;
-        match (&root, format) {
-            (None, _) => Ok(()),
-            (Some(root), OctreeFormat::LogOdds) => root.write_log_odds(writer),
-            (Some(Node::Inner(_, children)), OctreeFormat::Binary) => write_binary(children, writer),
-            // The format has no way to say that the whole world is alike.
-            (Some(Node::Leaf(_)), OctreeFormat::Binary) => Ok(()),
-        }
+        root.map_or(Ok(()), |root| below.write(&root, writer))
     })?;
     Ok(size)
 }
 
 /// Place on the curve that visits children before going on: bits of x, y and z interleaved.
-fn code_of(voxel: [i32; 3]) -> Option<u64> {
+fn code_of(voxel: Voxel) -> io::Result<u64> {
     let mut code = 0;
     for (axis, v) in voxel.into_iter().enumerate() {
-        let key = u16::try_from(v.checked_add(1 << (DEPTH - 1))?).ok()?;
+        let key = v.checked_add(1 << (DEPTH - 1)).and_then(|key| u16::try_from(key).ok());
+        let key = key.ok_or_else(|| {
+            io::Error::new(io::ErrorKind::InvalidData, format!("voxel {voxel:?} is too far from the origin"))
+        })?;
         for bit in 0..DEPTH {
             code |= u64::from(key >> bit & 1) << (3 * bit + axis as u32);
         }
     }
-    Some(code)
+    Ok(code)
 }
 
-impl Node {
-    /// The node over voxels in the order of their codes, `level` levels above them.
-    fn of(voxels: &[(u64, f32)], level: u32) -> Self {
-        if level == 0 {
-            return Self::Leaf(voxels.first().map_or(0.0, |(_, log_odds)| *log_odds));
+impl<I: Iterator<Item = OctreeVoxel>, F: Fn(Block) -> I> Blocks<F> {
+    /// The node of a block; `None` if nothing is known of it.
+    fn node(&self, block: Block) -> io::Result<Option<Node>> {
+        let mut coded = Vec::with_capacity((SIDE * SIDE * SIDE) as usize);
+        for OctreeVoxel { voxel, log_odds, color } in (self.voxels)(block) {
+            // A binary tree keeps which side of even odds, and is pruned accordingly.
+            let known = match self.format {
+                OctreeFormat::Binary if log_odds > 0.0 => (1.0, [0; 3]),
+                OctreeFormat::Binary => (-1.0, [0; 3]),
+                OctreeFormat::LogOdds => (log_odds, [0; 3]),
+                OctreeFormat::Colors => (log_odds, color),
+            };
+            coded.push((code_of(voxel)?, known));
         }
-        let shift = 3 * (level - 1);
-        let mut rest = voxels;
-        let mut children: [Option<Self>; 8] = Default::default();
-        for (number, child) in children.iter_mut().enumerate() {
-            let count = rest.partition_point(|(code, _)| (code >> shift & 7) as usize <= number);
-            let (own, others) = rest.split_at(count);
-            *child = (!own.is_empty()).then(|| Self::of(own, level - 1));
-            rest = others;
-        }
-        let first = match &children[0] {
-            Some(Self::Leaf(log_odds)) => Some(*log_odds),
-            _ => None,
-        };
-        let alike = |child: &Option<Self>| matches!((child, first), (Some(Self::Leaf(a)), Some(b)) if *a == b);
-        match first {
-            Some(log_odds) if children.iter().all(alike) => Self::Leaf(log_odds),
-            _ => {
-                let most = children.iter().flatten().map(Self::log_odds).fold(f32::NEG_INFINITY, f32::max);
-                Self::Inner(most, Box::new(children))
+        coded.sort_unstable_by_key(|(code, _)| *code);
+        coded.dedup_by_key(|(code, _)| *code);
+        Ok((!coded.is_empty()).then(|| Node::of(&coded, SIDE.ilog2())))
+    }
+
+    fn write(&self, node: &Node, writer: &mut dyn Write) -> io::Result<()> {
+        match (node, self.format) {
+            (Node::Block(_, block, _), _) => self.node(*block)?.map_or(Ok(()), |node| self.write(&node, writer)),
+            // A binary tree says of leaves in their parent what they are, and cannot say that the whole world is alike.
+            (Node::Leaf(_), OctreeFormat::Binary) => Ok(()),
+            (Node::Inner(_, children), OctreeFormat::Binary) => {
+                writer.write_all(&children_word(children).to_le_bytes())?;
+                children.iter().flatten().try_for_each(|child| self.write(child, writer))
+            }
+            (Node::Leaf(known), _) => self.write_known(*known, 0, writer),
+            (Node::Inner(known, children), _) => {
+                let bit = |number: usize| u8::from(children[number].is_some()) << number;
+                self.write_known(*known, (0..8).map(bit).sum(), writer)?;
+                children.iter().flatten().try_for_each(|child| self.write(child, writer))
             }
         }
     }
 
-    fn log_odds(&self) -> f32 {
+    /// Log-odds, perhaps the colour, then a bit for each child.
+    fn write_known(&self, (log_odds, color): Known, children: u8, writer: &mut dyn Write) -> io::Result<()> {
+        writer.write_all(&log_odds.to_le_bytes())?;
+        if self.format == OctreeFormat::Colors {
+            writer.write_all(&color)?;
+        }
+        writer.write_all(&[children])
+    }
+}
+
+/// Two bits for each child: 0 unknown, 1 free, 2 occupied, 3 more below.
+fn children_word(children: &[Option<Node>; 8]) -> u16 {
+    children.iter().enumerate().fold(0, |word, (number, child)| {
+        let says = match child {
+            None => 0,
+            Some(Node::Leaf((log_odds, _))) if *log_odds > 0.0 => 2,
+            Some(Node::Leaf(_)) => 1,
+            Some(Node::Inner(..) | Node::Block(..)) => 3,
+        };
+        word | says << (2 * number)
+    })
+}
+
+impl Node {
+    /// The node over voxels of a block in the order of their codes, `level` levels above them.
+    fn of(voxels: &[(u64, Known)], level: u32) -> Self {
+        if level == 0 {
+            return Self::Leaf(voxels.first().map_or_else(Known::default, |(_, known)| *known));
+        }
+        let mut rest = voxels;
+        Self::over(std::array::from_fn(|number| {
+            let (own, others) = rest.split_at(count_below(rest, level, number));
+            rest = others;
+            (!own.is_empty()).then(|| Self::of(own, level - 1))
+        }))
+    }
+
+    /// The node over blocks in the order of their codes, which it takes; `None` over none.
+    fn above(mut rest: &mut [(u64, Option<Self>)], level: u32) -> Option<Self> {
+        if level == SIDE.ilog2() || rest.is_empty() {
+            return rest.first_mut().and_then(|(_, node)| node.take());
+        }
+        Some(Self::over(std::array::from_fn(|number| {
+            let count = count_below(rest, level, number);
+            let (own, others) = std::mem::take(&mut rest).split_at_mut(count);
+            rest = others;
+            Self::above(own, level - 1)
+        })))
+    }
+
+    /// The node over these children: eight leaves that are alike become one.
+    fn over(children: [Option<Self>; 8]) -> Self {
+        let first = match &children[0] {
+            Some(Self::Leaf(known)) => Some(*known),
+            _ => None,
+        };
+        let alike = |child: &Option<Self>| matches!((child, first), (Some(Self::Leaf(a)), Some(b)) if *a == b);
+        if let Some(known) = first.filter(|_| children.iter().all(alike)) {
+            return Self::Leaf(known);
+        }
+        let known = || children.iter().flatten().map(Self::known);
+        let most = known().map(|(log_odds, _)| log_odds).fold(f32::NEG_INFINITY, f32::max);
+        let mean = |axis: usize| known().map(|(_, rgb)| usize::from(rgb[axis])).sum::<usize>() / known().count().max(1);
+        Self::Inner((most, [0, 1, 2].map(|axis| mean(axis) as u8)), Box::new(children))
+    }
+
+    /// A block's node without what hangs below it.
+    fn summary(self, block: Block) -> Self {
+        let mut size = OctreeSize::default();
+        self.count(&mut size);
+        if let Self::Inner(known, _) = self { Self::Block(known, block, size) } else { self }
+    }
+
+    fn known(&self) -> Known {
         match self {
-            Self::Leaf(log_odds) | Self::Inner(log_odds, _) => *log_odds,
+            Self::Leaf(known) | Self::Inner(known, _) | Self::Block(known, ..) => *known,
         }
     }
 
     fn count(&self, size: &mut OctreeSize) {
-        size.nodes += 1;
         match self {
-            Self::Leaf(_) => size.leaves += 1,
-            Self::Inner(_, children) => children.iter().flatten().for_each(|child| child.count(size)),
+            Self::Leaf(_) => {
+                size.nodes += 1;
+                size.leaves += 1;
+            }
+            Self::Inner(_, children) => {
+                size.nodes += 1;
+                children.iter().flatten().for_each(|child| child.count(size));
+            }
+            Self::Block(_, _, own) => {
+                size.nodes += own.nodes;
+                size.leaves += own.leaves;
+            }
         }
-    }
-
-    /// Log-odds, then a bit for each child, then the children.
-    fn write_log_odds(&self, writer: &mut dyn Write) -> io::Result<()> {
-        writer.write_all(&self.log_odds().to_le_bytes())?;
-        let Self::Inner(_, children) = self else { return writer.write_all(&[0]) };
-        let bits = (0..8).filter(|&number| children[number].is_some()).fold(0u8, |bits, number| bits | 1 << number);
-        writer.write_all(&[bits])?;
-        children.iter().flatten().try_for_each(|child| child.write_log_odds(writer))
     }
 }
 
-/// Two bits for each child, then the children that have children: 0 unknown, 1 free, 2 occupied, 3 more below.
-fn write_binary(children: &[Option<Node>; 8], writer: &mut dyn Write) -> io::Result<()> {
-    let word = children.iter().enumerate().fold(0u16, |word, (number, child)| {
-        let says = match child {
-            None => 0,
-            Some(Node::Leaf(log_odds)) if *log_odds > 0.0 => 2,
-            Some(Node::Leaf(_)) => 1,
-            Some(Node::Inner(..)) => 3,
-        };
-        word | says << (2 * number)
-    });
-    writer.write_all(&word.to_le_bytes())?;
-    for child in children.iter().flatten() {
-        if let Node::Inner(_, below) = child {
-            write_binary(below, writer)?;
-        }
-    }
-    Ok(())
+/// How many of these codes, which are in order, are in the children up to `number` of a node of that level.
+fn count_below<T>(sorted: &[(u64, T)], level: u32, number: usize) -> usize {
+    sorted.partition_point(|(code, _)| (code >> (3 * (level - 1)) & 7) as usize <= number)
 }
 
 #[cfg(test)]

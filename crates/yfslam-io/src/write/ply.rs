@@ -15,15 +15,24 @@ pub struct PlyPoint {
     pub color: [u8; 3],
 }
 
-/// Writes `points` as PLY.
+/// What points show.
+#[derive(Clone, Copy, Debug)]
+pub struct Labels<'a> {
+    /// The class of each point, 0 where it is unknown.
+    pub classes: &'a [u8],
+    /// Names of the classes, from class 1 on.
+    pub names: &'a [String],
+}
+
+/// Writes `points` as PLY, with labels as a property `class`, whose names stand in comments.
 ///
 /// # Errors
 /// The file cannot be written, or a position is not finite.
-pub fn write_ply<I>(path: &Path, points: I) -> Result<()>
+pub fn write_ply<I>(path: &Path, points: I, labels: Option<Labels>) -> Result<()>
 where
     I: IntoIterator<Item = PlyPoint, IntoIter: ExactSizeIterator>,
 {
-    write(path, points.into_iter(), &[])
+    write(path, points.into_iter(), labels, &[])
 }
 
 /// Writes a mesh as PLY: coloured vertices, and triangles as numbers of three of them.
@@ -34,28 +43,44 @@ pub fn write_ply_mesh<I>(path: &Path, vertices: I, triangles: &[[u32; 3]]) -> Re
 where
     I: IntoIterator<Item = PlyPoint, IntoIter: ExactSizeIterator>,
 {
-    write(path, vertices.into_iter(), triangles)
+    write(path, vertices.into_iter(), None, triangles)
 }
 
-fn write(path: &Path, points: impl ExactSizeIterator<Item = PlyPoint>, triangles: &[[u32; 3]]) -> Result<()> {
+fn write(
+    path: &Path,
+    points: impl ExactSizeIterator<Item = PlyPoint>,
+    labels: Option<Labels>,
+    triangles: &[[u32; 3]],
+) -> Result<()> {
     write_atomically(path, |writer| {
+        writer.write_all(b"ply\nformat binary_little_endian 1.0\n")?;
+        for (class, name) in labels.iter().flat_map(|labels| (1..).zip(labels.names)) {
+            // A line of its own for each, whatever a name holds.
+            writeln!(writer, "comment class {class} {}", name.replace(char::is_control, " "))?;
+        }
         write!(
             writer,
-            "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+            "element vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
              property uchar red\nproperty uchar green\nproperty uchar blue\n",
             points.len()
         )?;
+        if labels.is_some() {
+            writer.write_all(b"property uchar class\n")?;
+        }
         if !triangles.is_empty() {
             write!(writer, "element face {}\nproperty list uchar int vertex_indices\n", triangles.len())?;
         }
         writer.write_all(b"end_header\n")?;
-        for PlyPoint { position_m: [x, y, z], color: [r, g, b] } in points {
+        for (number, PlyPoint { position_m: [x, y, z], color: [r, g, b] }) in points.enumerate() {
             if !(x.is_finite() && y.is_finite() && z.is_finite()) {
                 return Err(io::Error::new(io::ErrorKind::InvalidData, format!("point ({x}, {y}, {z}) is not finite")));
             }
             let ([x0, x1, x2, x3], [y0, y1, y2, y3], [z0, z1, z2, z3]) =
                 (x.to_le_bytes(), y.to_le_bytes(), z.to_le_bytes());
             writer.write_all(&[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3, r, g, b])?;
+            if let Some(labels) = labels {
+                writer.write_all(&[labels.classes.get(number).copied().unwrap_or_default()])?;
+            }
         }
         for corners in triangles {
             writer.write_all(&[3])?;
@@ -77,7 +102,7 @@ mod tests {
             PlyPoint { position_m: [1.0, -2.5, 0.125], color: [1, 2, 3] },
             PlyPoint { position_m: [0.0, 0.0, 4.0], color: [255, 0, 7] },
         ];
-        write_ply(&path, points).unwrap();
+        write_ply(&path, points, None).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let end = b"end_header\n";
         let header = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
@@ -86,6 +111,20 @@ mod tests {
         assert_eq!(bytes[header + 4..header + 8], (-2.5f32).to_le_bytes());
         assert_eq!(bytes[header + 12..header + 15], [1, 2, 3]);
         assert_eq!(bytes[bytes.len() - 3..], [255, 0, 7]);
+    }
+
+    #[test]
+    fn classes_follow_the_colours_and_their_names_stand_in_the_header() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cloud.ply");
+        let points = [1.0, 2.0].map(|x| PlyPoint { position_m: [x, 0.0, 0.0], color: [7, 8, 9] });
+        let names = ["chair".to_owned(), "odd\nname".to_owned()];
+        write_ply(&path, points, Some(Labels { classes: &[0, 2], names: &names })).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(text.contains("comment class 1 chair\ncomment class 2 odd name\nelement vertex 2\n"), "{text}");
+        assert!(text.contains("property uchar blue\nproperty uchar class\nend_header\n"), "{text}");
+        assert_eq!((bytes[bytes.len() - 17], &bytes[bytes.len() - 4..]), (0, [7, 8, 9, 2].as_slice()));
     }
 
     #[test]
@@ -104,8 +143,9 @@ mod tests {
     fn a_point_that_is_not_finite_is_refused_and_nothing_is_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cloud.ply");
-        let error =
-            write_ply(&path, [PlyPoint { position_m: [f32::NAN, 0.0, 0.0], color: [0; 3] }]).unwrap_err().to_string();
+        let error = write_ply(&path, [PlyPoint { position_m: [f32::NAN, 0.0, 0.0], color: [0; 3] }], None)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("cloud.ply") && error.contains("not finite"), "{error}");
         assert!(!path.exists());
     }

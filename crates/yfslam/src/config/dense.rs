@@ -43,6 +43,12 @@ config_section! {
         occupied: f32 = 0.5,
         /// Part of a voxel by which a piece's surfaces may be off, after a correction of the map, before they are entered anew.
         follow_voxels: f32 = 0.5,
+        /// Memory that the map of `yfslam map` may take, MB (10⁶ bytes), and each of its products beside it: where it would be more, an error
+        /// says which resolution fits.
+        max_memory_mb: usize = 4000,
+        /// Whether pieces keep the classes of things, if a detector finds any that cannot move. Costs a fifth more memory then. Source:
+        /// DS-SLAM's semantic octree.
+        classes: bool = true,
         /// Neighbours, of 26, that a voxel needs in clouds: those with fewer are outliers.
         min_neighbours: usize = 4,
         /// Distance from the surface over which the mesh's distance field is kept, voxels.
@@ -57,7 +63,7 @@ impl DenseConfig {
     /// For the first such value.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let probability = |p: f32| p > 0.0 && p < 1.0;
-        let checks: [(&'static str, String, bool, &'static str); 11] = [
+        let checks: [(&'static str, String, bool, &'static str); 12] = [
             (
                 "dense.resolution_m",
                 self.resolution_m.to_string(),
@@ -87,6 +93,7 @@ impl DenseConfig {
                 "above `occupied`, below 1",
             ),
             ("dense.occupied", self.occupied.to_string(), probability(self.occupied), "above 0, below 1"),
+            ("dense.max_memory_mb", self.max_memory_mb.to_string(), self.max_memory_mb > 0, "1 MB or more"),
             ("dense.follow_voxels", self.follow_voxels.to_string(), self.follow_voxels >= 0.0, "0 or more voxels"),
             (
                 "dense.truncation_voxels",

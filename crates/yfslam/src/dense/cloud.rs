@@ -57,6 +57,12 @@ pub fn cloud(survey: &Survey, volume: &Volume, mut told: impl FnMut(usize)) -> V
     points
 }
 
+/// Bytes of memory that the sums of a cloud take.
+pub fn bytes(volume: &Volume) -> usize {
+    let shows_surface = |block: &Block| volume.voxels_in(*block).any(|known| known.occupied);
+    volume.blocks().filter(shows_surface).count() * VOXELS * size_of::<Sum>()
+}
+
 /// Occupied voxels among the 26 around one.
 pub fn neighbours(volume: &Volume, [x, y, z]: Voxel) -> usize {
     let around = (0..27).filter(|i| *i != 13).map(|i| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]);

@@ -31,6 +31,9 @@ pub struct DenseMapper {
     /// Time and pose, world from camera, of the last piece as it was cut.
     last: Option<(i64, Pose)>,
     keeper: Keeper,
+    /// Memory of the pieces.
+    bytes: usize,
+    class_names: Vec<String>,
     passed_over: usize,
 }
 
@@ -80,7 +83,8 @@ impl DenseMapper {
                 Keeper::Threaded { sender, thread: builder.spawn(move || store.obey(&orders))? }
             }
         };
-        Ok(Self { config: config.clone(), grid, ties: Vec::new(), last: None, keeper, passed_over: 0 })
+        let (ties, class_names) = (Vec::new(), Vec::new());
+        Ok(Self { config: config.clone(), grid, ties, last: None, keeper, bytes: 0, class_names, passed_over: 0 })
     }
 
     /// The mapper with the pieces of an earlier session, whose `map` this session goes on with; they come before its own.
@@ -88,7 +92,7 @@ impl DenseMapper {
     /// # Errors
     /// If the pieces are of other cells or another map.
     pub fn with_pieces(mut self, survey: Survey, map: &Map) -> Result<Self, DenseError> {
-        let Survey { grid, mut pieces, apart } = survey;
+        let Survey { grid, mut pieces, apart, class_names } = survey;
         if grid != self.grid {
             let (found, wanted) = (grid.stride_px(), self.grid.stride_px());
             let (width, height) = (grid.camera().width, grid.camera().height);
@@ -103,11 +107,18 @@ impl DenseMapper {
         for SurveyPiece { timestamp_ns, keyframe, t_world_cam, piece } in pieces {
             let (id, t_reference_world) = keyframes.get(&keyframe).ok_or(DenseError::Keyframe(keyframe))?;
             self.ties.push((*id, (t_reference_world * t_world_cam).inverse()));
+            self.bytes += piece.bytes();
             known.push((timestamp_ns, piece));
         }
+        self.class_names = class_names;
         let poses = self.poses(map);
         self.keeper.follow(known, poses);
         Ok(self)
+    }
+
+    /// The cells of its pieces.
+    pub fn grid(&self) -> &CellGrid {
+        &self.grid
     }
 
     /// Whether a keyframe tells enough beyond the last piece to become one.
@@ -125,15 +136,33 @@ impl DenseMapper {
         Piece::cut(&self.config, &self.grid, color, depth, moves)
     }
 
+    /// What classes are in pieces of this mapper, by their place in `names`, those of a detector: as in those of an earlier session. Of
+    /// more than 255 in all, the last are unknown.
+    pub fn name_classes(&mut self, names: &[String]) -> Vec<u8> {
+        let known = &mut self.class_names;
+        let class = |name: &String| {
+            let at = known.iter().position(|other| other == name).unwrap_or(known.len());
+            if at == known.len() && at < usize::from(u8::MAX) {
+                known.push(name.clone());
+            }
+            u8::try_from(at + 1).unwrap_or(0)
+        };
+        names.iter().map(class).collect()
+    }
+
     /// Hangs a piece on a keyframe, and brings the volume to where the map has all pieces now.
     pub fn hang(&mut self, timestamp_ns: i64, tie: Tie, piece: Piece, map: &Map) {
         self.ties.push(tie);
         let poses = self.poses(map);
         let pose = poses.last().copied().flatten();
+        let bytes = piece.bytes();
         if !self.keeper.follow(vec![(timestamp_ns, piece)], poses) {
             self.ties.pop();
             self.passed_over += 1;
-        } else if let Some(pose) = pose {
+            return;
+        }
+        self.bytes += bytes;
+        if let Some(pose) = pose {
             self.last = Some((timestamp_ns, pose));
         }
     }
@@ -191,13 +220,14 @@ impl DenseMapper {
 
     /// Bytes of memory that the pieces take.
     pub fn bytes(&self) -> usize {
-        self.len() * self.grid.rays().len() * Piece::BYTES_PER_CELL
+        self.bytes
     }
 
     /// Forgets all: the map was begun anew.
     pub fn clear(&mut self) {
         self.ties.clear();
         self.last = None;
+        self.bytes = 0;
         match &mut self.keeper {
             Keeper::Inline(store) => store.clear(),
             Keeper::Threaded { sender, .. } => {
@@ -221,7 +251,8 @@ impl DenseMapper {
             }
             Keeper::Gone => Vec::new(),
         };
-        let mut survey = Survey { pieces: Vec::new(), apart: Vec::new(), grid: self.grid };
+        let (grid, class_names) = (self.grid, self.class_names);
+        let mut survey = Survey { pieces: Vec::new(), apart: Vec::new(), grid, class_names };
         for (((keyframe, _), place), (timestamp_ns, piece)) in self.ties.iter().zip(places).zip(pieces) {
             let Some(((root, t_world_cam), (keyframe, _))) = place.zip(map.standing(*keyframe)) else { continue };
             let one = SurveyPiece { timestamp_ns, keyframe: keyframe.sequence, t_world_cam, piece };
@@ -409,6 +440,19 @@ mod tests {
             }
             map.set_pose(ties[1].0, pose);
         }
+    }
+
+    #[test]
+    fn classes_keep_their_numbers_when_a_later_session_has_another_detector() {
+        let (map, _) = map();
+        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let mut first = mapper(Execution::Inline);
+        assert_eq!(first.name_classes(&names(&["person", "chair"])), [1, 2]);
+        let mut second = mapper(Execution::Inline).with_pieces(first.into_survey(&map), &map).unwrap();
+        assert_eq!(second.name_classes(&names(&["chair", "tv", "person"])), [2, 3, 1]);
+        assert_eq!(second.into_survey(&map).class_names, ["person", "chair", "tv"]);
+        let many: Vec<String> = (0..300).map(|class| class.to_string()).collect();
+        assert_eq!(mapper(Execution::Inline).name_classes(&many)[253..257], [254, 255, 0, 0]);
     }
 
     #[test]

@@ -45,6 +45,11 @@ pub fn mesh(survey: &Survey, volume: &Volume, mut told: impl FnMut(usize, usize)
     surface(volume, &field)
 }
 
+/// Bytes of memory that the field of a mesh takes.
+pub fn bytes(volume: &Volume) -> usize {
+    near_surfaces(volume).len() * VOXELS * size_of::<Sample>()
+}
+
 /// Blocks within two voxels of occupied ones.
 fn near_surfaces(volume: &Volume) -> BTreeSet<Block> {
     let mut near = BTreeSet::new();

@@ -3,7 +3,7 @@
 //! ```text
 //! frame ─► piece ──hangs on its keyframe──► mapper ─► volume      occupied, free, unknown; follows every correction
 //!          depth and colour without          │
-//!          edges; what moves is marked       └──► survey ─► cloud, grid, mesh, background
+//!          edges; what moves is marked       └──► survey ─► cloud, grid, mesh, classes, background
 //! ```
 //!
 //! Nothing that moves makes a surface: the dynamic filter's decision is cut into the piece. What it missed is taken back by the views
@@ -11,6 +11,7 @@
 
 pub mod background;
 mod beside;
+pub mod classes;
 pub mod cloud;
 pub mod grid;
 mod mapper;
@@ -58,6 +59,23 @@ pub enum DenseError {
     /// Pieces of another map.
     #[error("a piece hangs on keyframe {0}, which the map does not have: the pieces are of another map")]
     Keyframe(u64),
+    /// More memory than is allowed.
+    #[error(
+        "at {resolution_m} m {what} would take about {needed_mb} MB, more than the {allowed_mb} MB that dense.max_memory_mb allows: choose \
+         a resolution of {fits_m} m or coarser (dense.resolution_m), a shorter dense.max_range_m, or allow more"
+    )]
+    Memory {
+        /// Side of a voxel, m.
+        resolution_m: f32,
+        /// What takes it.
+        what: &'static str,
+        /// How much, MB.
+        needed_mb: usize,
+        /// How much is allowed, MB.
+        allowed_mb: usize,
+        /// Side of a voxel with which it is less, m.
+        fits_m: f32,
+    },
     /// A thread could not be started.
     #[error("the thread of the dense map could not be started: {0}; raise the limit of threads of this user")]
     Thread(#[from] std::io::Error),
@@ -73,6 +91,8 @@ pub struct Survey {
     /// Those of submaps that are not joined with that of most pieces, each in its own world, with its place among all pieces. No product
     /// shows them; they come in when their submap is joined in a later session.
     pub apart: Vec<(usize, SurveyPiece)>,
+    /// Names of the classes that cells may have, from class 1 on; none if no detector looked for things.
+    pub class_names: Vec<String>,
 }
 
 /// A piece in its place.
@@ -97,22 +117,102 @@ impl Survey {
             t_world_cam,
             piece,
         };
-        Self { pieces: pieces.into_iter().enumerate().map(number).collect(), apart: Vec::new(), grid }
+        Self {
+            pieces: pieces.into_iter().enumerate().map(number).collect(),
+            apart: Vec::new(),
+            grid,
+            class_names: Vec::new(),
+        }
     }
 
     /// Bytes of memory that its pieces take.
     pub fn bytes(&self) -> usize {
-        self.pieces.len() * self.grid.rays().len() * Piece::BYTES_PER_CELL
+        self.pieces.iter().map(|one| one.piece.bytes()).sum()
     }
 
     /// The volume of all pieces in a world turned by `turn`. `told` hears how many pieces are done.
     pub fn volume(&self, config: &DenseConfig, turn: &UnitQuaternion<f64>, mut told: impl FnMut(usize)) -> Volume {
+        self.fill(config, turn, |number, _| {
+            told(number);
+            true
+        })
+    }
+
+    /// The same, within the memory that the configuration allows.
+    ///
+    /// # Errors
+    /// Where it would be more.
+    pub fn volume_within(
+        &self,
+        config: &DenseConfig,
+        turn: &UnitQuaternion<f64>,
+        mut told: impl FnMut(usize),
+    ) -> Result<Volume, DenseError> {
+        let mut refused = None;
+        let volume = self.fill(config, turn, |number, volume| {
+            told(number);
+            let bytes = volume.bytes();
+            if check_memory(config, "the map", bytes).is_err() {
+                // As much again for each piece that is still to come.
+                refused = check_memory(config, "the map", bytes / number.max(1) * self.pieces.len()).err();
+            }
+            refused.is_none()
+        });
+        refused.map_or(Ok(volume), Err)
+    }
+
+    /// Enters pieces for as long as `goes_on`, which is asked before each, says so.
+    fn fill(
+        &self,
+        config: &DenseConfig,
+        turn: &UnitQuaternion<f64>,
+        mut goes_on: impl FnMut(usize, &Volume) -> bool,
+    ) -> Volume {
         let mut volume = Volume::new(config);
         for (number, one) in self.pieces.iter().enumerate() {
-            told(number);
+            if !goes_on(number, &volume) {
+                return volume;
+            }
             volume.place(number, &self.grid, &one.piece, Some(&(turn * one.t_world_cam)));
         }
+        goes_on(self.pieces.len(), &volume);
         volume.settle();
         volume
+    }
+}
+
+/// Whether `what` may take so many bytes.
+///
+/// # Errors
+/// If the configuration allows less.
+pub fn check_memory(config: &DenseConfig, what: &'static str, bytes: usize) -> Result<(), DenseError> {
+    let (needed_mb, allowed_mb) = (bytes.div_ceil(1_000_000), config.max_memory_mb);
+    if needed_mb <= allowed_mb {
+        return Ok(());
+    }
+    // Surfaces grow with the square of the resolution, space with its cube: the square is the safe side. In steps of 5 mm.
+    let finer = (needed_mb as f32 / allowed_mb as f32).sqrt();
+    let fits_m = ((config.resolution_m * finer * 200.0).ceil() / 200.0).min(0.2);
+    Err(DenseError::Memory { resolution_m: config.resolution_m, what, needed_mb, allowed_mb, fits_m })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_that_would_take_too_much_memory_is_refused_and_the_resolution_that_is_advised_fits() {
+        let mut config = DenseConfig { resolution_m: 0.01, max_memory_mb: 2, ..Default::default() };
+        let grid = CellGrid::new(&scene::camera(), config.stride_px);
+        let pose = |k: u32| Pose::translation(0.0, 0.0, f64::from(k) * 0.4);
+        let survey = Survey::of_poses(grid.clone(), (0..6).map(|k| (pose(k), scene::wall(&grid, 3.01, Some(1.5)))));
+        let turn = UnitQuaternion::identity();
+        let error = survey.volume_within(&config, &turn, |_| {}).err().unwrap();
+        let DenseError::Memory { fits_m, allowed_mb: 2, .. } = error else { panic!("{error}") };
+        assert!(error.to_string().contains("at 0.01 m the map would take"), "{error}");
+        config.resolution_m = fits_m;
+        let volume = survey.volume_within(&config, &turn, |_| {}).unwrap();
+        assert!(volume.bytes() <= 2_000_000);
+        assert!(volume.voxels().eq(survey.volume(&config, &turn, |_| {}).voxels()));
     }
 }

@@ -14,6 +14,8 @@ use crate::packed::{MAP, PIECES, PackedError};
 struct Records {
     camera: CameraRecord,
     stride_px: u32,
+    /// Of those that pieces have, from class 1 on.
+    class_names: Vec<String>,
     pieces: Vec<PieceRecord>,
     /// With their place among all pieces.
     apart: Vec<(u32, PieceRecord)>,
@@ -27,6 +29,8 @@ struct PieceRecord {
     pose: [f64; 7],
     depth: Vec<i16>,
     color: Vec<u8>,
+    /// As it is in the piece: none, or one for each cell.
+    class: Vec<u8>,
 }
 
 /// The survey as bytes.
@@ -37,6 +41,7 @@ pub fn encode(survey: &Survey) -> Result<Vec<u8>, PackedError> {
     PIECES.pack(&Records {
         camera: CameraRecord::of(survey.grid.camera()),
         stride_px: survey.grid.stride_px() as u32,
+        class_names: survey.class_names.clone(),
         pieces: survey.pieces.iter().map(PieceRecord::of).collect(),
         apart: survey.apart.iter().map(|(at, one)| (*at as u32, PieceRecord::of(one))).collect(),
     })
@@ -54,7 +59,7 @@ pub fn decode(bytes: &[u8]) -> Result<Survey, PackedError> {
     if !map.is_empty() {
         MAP.whole(map)?;
     }
-    let Records { camera, stride_px, pieces, apart } = packed.unpack()?;
+    let Records { camera, stride_px, class_names, pieces, apart } = packed.unpack()?;
     let camera = camera.into_camera();
     let wrong = |what: String| Err(PackedError::Records(what));
     if stride_px == 0 || stride_px as usize > camera.width.min(camera.height) {
@@ -65,14 +70,16 @@ pub fn decode(bytes: &[u8]) -> Result<Survey, PackedError> {
         return wrong(format!("a camera of {} × {} px", camera.width, camera.height));
     }
     let grid = CellGrid::new(&camera, stride_px as usize);
-    let pieces = pieces.into_iter().map(|record| record.into_piece(&grid));
-    let apart = apart.into_iter().map(|(at, record)| Ok((at as usize, record.into_piece(&grid)?)));
-    Ok(Survey { pieces: pieces.collect::<Result<_, _>>()?, apart: apart.collect::<Result<_, _>>()?, grid })
+    let piece = |record: PieceRecord| record.into_piece(&grid, class_names.len());
+    let pieces = pieces.into_iter().map(piece).collect::<Result<_, _>>()?;
+    let apart = apart.into_iter().map(|(at, record)| Ok((at as usize, piece(record)?)));
+    let apart = apart.collect::<Result<_, _>>()?;
+    Ok(Survey { pieces, apart, grid, class_names })
 }
 
 impl PieceRecord {
     fn of(one: &SurveyPiece) -> Self {
-        let Piece { depth, color } = &one.piece;
+        let Piece { depth, color, class } = &one.piece;
         let (mut last_depth, mut last_color) = (0u16, [0u8; 3]);
         Self {
             timestamp_ns: one.timestamp_ns,
@@ -86,10 +93,11 @@ impl PieceRecord {
                     [0, 1, 2].map(|channel| rgb[channel].wrapping_sub(last[channel]))
                 })
                 .collect(),
+            class: class.clone(),
         }
     }
 
-    fn into_piece(self, grid: &CellGrid) -> Result<SurveyPiece, PackedError> {
+    fn into_piece(self, grid: &CellGrid, classes: usize) -> Result<SurveyPiece, PackedError> {
         let cells = grid.columns() * grid.rows();
         if self.depth.len() != cells || self.color.len() != 3 * cells {
             let (depth, color) = (self.depth.len(), self.color.len());
@@ -97,6 +105,14 @@ impl PieceRecord {
                 "the piece of keyframe {} has {depth} depths and {color} colour values for {cells} cells",
                 self.keyframe
             )));
+        }
+        let unnamed = self.class.iter().find(|class| usize::from(**class) > classes);
+        if let Some(class) = unnamed.filter(|_| self.class.len() == cells) {
+            return Err(PackedError::Records(format!("class {class} has no name: there are {classes}")));
+        }
+        if self.class.len() != cells && !self.class.is_empty() {
+            let (found, keyframe) = (self.class.len(), self.keyframe);
+            return Err(PackedError::Records(format!("{found} classes for {cells} cells of keyframe {keyframe}")));
         }
         let Some(t_world_cam) = pose_of(&self.pose) else {
             let Self { keyframe, pose, .. } = self;
@@ -115,8 +131,8 @@ impl PieceRecord {
             color
         });
         let color = colors.collect();
-        let Self { timestamp_ns, keyframe, .. } = self;
-        Ok(SurveyPiece { timestamp_ns, keyframe, t_world_cam, piece: Piece { depth, color } })
+        let Self { timestamp_ns, keyframe, class, .. } = self;
+        Ok(SurveyPiece { timestamp_ns, keyframe, t_world_cam, piece: Piece { depth, color, class } })
     }
 }
 
@@ -141,7 +157,9 @@ mod tests {
         let mut pieces: Vec<_> = (0..3).map(piece).collect();
         pieces[1].piece.color.iter_mut().enumerate().for_each(|(i, rgb)| *rgb = [i as u8, (i * 7) as u8, 255]);
         pieces[2].piece.depth.iter_mut().for_each(|d| *d |= 1 << 15);
-        Survey { pieces, apart: vec![(1, piece(7))], grid }
+        pieces[0].piece = pieces[0].piece.clone().with_classes(&grid, |[x, _]| u8::from(x < 20.0) * 2);
+        let class_names = vec!["chair".to_owned(), "tv".to_owned()];
+        Survey { pieces, apart: vec![(1, piece(7))], grid, class_names }
     }
 
     /// A map of one keyframe.
@@ -156,6 +174,14 @@ mod tests {
         let survey = survey();
         let read = decode(&encode(&survey).unwrap()).unwrap();
         assert_eq!(read, survey);
+    }
+
+    #[test]
+    fn a_class_without_a_name_is_refused() {
+        let mut survey = survey();
+        survey.class_names.truncate(1);
+        let error = decode(&encode(&survey).unwrap()).unwrap_err().to_string();
+        assert!(error.contains("class 2 has no name"), "{error}");
     }
 
     #[test]

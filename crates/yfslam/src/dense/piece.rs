@@ -68,6 +68,12 @@ impl CellGrid {
         &self.rays
     }
 
+    /// Middle of a cell, px of the raw image.
+    pub fn middle_px(&self, cell: usize) -> [f32; 2] {
+        let half = 0.5 * (self.stride_px - 1) as f32;
+        [cell % self.columns, cell / self.columns].map(|at| (at * self.stride_px) as f32 + half)
+    }
+
     /// Position of a point of the camera frame on the grid, in cells, the middle of the first cell being (0, 0); `None` behind the
     /// camera or outside the grid.
     pub fn project(&self, p: &Point3<f32>) -> Option<[f32; 2]> {
@@ -102,12 +108,11 @@ pub struct Piece {
     pub(crate) depth: Vec<u16>,
     /// Mean colour of the cell's pixels.
     pub(crate) color: Vec<[u8; 3]>,
+    /// Class of each cell's surface, 0 where it is unknown; empty where nobody looked.
+    pub(crate) class: Vec<u8>,
 }
 
 impl Piece {
-    /// Memory that a cell takes: depth and colour.
-    pub const BYTES_PER_CELL: usize = size_of::<u16>() + size_of::<[u8; 3]>();
-
     /// Cuts the piece of a frame: `moves(position, edge)` tells whether a position of the image, px, is within `edge` px of what moves.
     pub fn cut(
         config: &DenseConfig,
@@ -118,24 +123,34 @@ impl Piece {
     ) -> Self {
         let rough = cell_depths(config, grid, depth);
         let metres = smoothed(config, grid, &rough);
-        let half = 0.5 * (grid.stride_px - 1) as f32;
-        let at = |cell: usize| (cell * grid.stride_px) as f32 + half;
         let mut cells = Vec::with_capacity(metres.len());
         for (i, &z) in metres.iter().enumerate() {
             let (column, row) = (i % grid.columns, i / grid.columns);
             let kept = z > 0.0 && !is_edge(config, grid, &rough, column, row);
             // Colour of what moves has to be known as such even where it has no depth.
-            let mark = if moves([at(column), at(row)], config.edge_px) { MOVING } else { 0 };
+            let mark = if moves(grid.middle_px(i), config.edge_px) { MOVING } else { 0 };
             cells.push(if kept { ((z / UNIT_M + 0.5) as u16).min(MOVING - 1) | mark } else { mark });
         }
-        Self { depth: cells, color: cell_colors(grid, color) }
+        Self { depth: cells, color: cell_colors(grid, color), class: Vec::new() }
     }
 
     /// The piece of depths, m (0 where nothing was measured), that are exact and stand still, of one colour.
     pub fn of_depths(depths_m: impl IntoIterator<Item = f32>, color: [u8; 3]) -> Self {
         let units = |z: f32| ((z / UNIT_M + 0.5) as u16).min(MOVING - 1);
         let depth: Vec<u16> = depths_m.into_iter().map(units).collect();
-        Self { color: vec![color; depth.len()], depth }
+        Self { color: vec![color; depth.len()], depth, class: Vec::new() }
+    }
+
+    /// The piece with classes: `class(position)` is that of what a position of the image, px, shows; 0 where that is unknown.
+    pub fn with_classes(mut self, grid: &CellGrid, class: impl Fn([f32; 2]) -> u8) -> Self {
+        let of_cell = |cell| self.surface_m(cell).map_or(0, |_| class(grid.middle_px(cell)));
+        self.class = (0..self.depth.len()).map(of_cell).collect();
+        self
+    }
+
+    /// Bytes of memory that it takes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.depth) + size_of_val(&*self.color) + self.class.len()
     }
 
     /// What a cell measured; `None` where there is no depth.
@@ -160,6 +175,12 @@ impl Piece {
     /// Mean colour of a cell's pixels.
     pub fn color(&self, cell: usize) -> [u8; 3] {
         self.color.get(cell).copied().unwrap_or_default()
+    }
+
+    /// Class of a cell's surface, 0 where it is unknown; `None` where nobody looked.
+    #[inline]
+    pub fn class(&self, cell: usize) -> Option<u8> {
+        self.class.get(cell).copied()
     }
 
     /// Static points in the camera frame, with colour, up to `max_range_m` of depth.

@@ -166,11 +166,18 @@ impl Volume {
 
     /// All voxels of which something is known, ordered by block, then by place in it.
     pub fn voxels(&self) -> impl Iterator<Item = KnownVoxel> {
-        self.blocks.iter().flat_map(move |(&block, state)| {
-            (0..VOXELS)
-                .filter(|&place| state.known.contains(place))
-                .map(move |place| self.known(voxel_in(block, place), state.log_odds[place]))
-        })
+        self.blocks.iter().flat_map(move |(&block, state)| self.known_of(block, state))
+    }
+
+    /// Those in a block.
+    pub fn voxels_in(&self, block: Block) -> impl Iterator<Item = KnownVoxel> {
+        self.blocks.get(&block).into_iter().flat_map(move |state| self.known_of(block, state))
+    }
+
+    fn known_of(&self, block: Block, state: &BlockState) -> impl Iterator<Item = KnownVoxel> {
+        (0..VOXELS)
+            .filter(|&place| state.known.contains(place))
+            .map(move |place| self.known(voxel_in(block, place), state.log_odds[place]))
     }
 
     /// Blocks of which something is known, in order.
@@ -211,7 +218,7 @@ impl Volume {
     /// Bytes of memory that the volume takes, pieces not counted.
     pub fn bytes(&self) -> usize {
         let said = size_of::<(u32, Bits, Bits)>();
-        let states: usize = self.blocks.values().map(|s| s.said.capacity() * said + 2 * s.log_odds.capacity()).sum();
+        let states: usize = self.blocks.values().map(|s| s.said.capacity() * said + 2 * VOXELS).sum();
         let entered: usize = self.pieces.iter().flatten().map(|p| p.blocks.capacity() * size_of::<Block>()).sum();
         states + entered + self.blocks.len() * (size_of::<BlockState>() + size_of::<Block>())
     }

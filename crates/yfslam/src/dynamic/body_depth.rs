@@ -81,6 +81,16 @@ impl DepthGroups {
         Some((self.center(&group), group.members))
     }
 
+    /// Depth of the body in a box, m, in what others leave free of it.
+    pub fn thing_in(&mut self, config: &DynamicConfig, bbox: &BoundingBox, bodies: &BodyMask) -> Option<f32> {
+        self.feature_depths.clear();
+        self.pixel_depths.clear();
+        bodies.free_depths(bbox, &mut self.pixel_depths);
+        self.pixel_depths.sort_unstable_by(f32::total_cmp);
+        let group = self.body_in_front(config)?;
+        Some(self.center(&group))
+    }
+
     /// Sorted depths of the features and of a grid of pixels inside a box.
     fn collect(&mut self, bbox: &BoundingBox, depth: &DepthImage, features: &FrameFeatures) {
         self.feature_depths.clear();

@@ -192,10 +192,14 @@ impl BodyMask {
 
     /// Marks the cells whose middle a mask of movable objects covers.
     pub fn mark_mask(&mut self, mask: &Image<u8>) {
+        self.mark_where(|x, y| mask.get(x, y).is_some_and(|number| *number > 0));
+    }
+
+    /// Marks the cells whose middle, px, is said to move.
+    pub fn mark_where(&mut self, moves: impl Fn(usize, usize) -> bool) {
         for (row, line) in self.owner.chunks_mut(self.columns.max(1)).enumerate() {
-            let y = row * CELL_PX + CELL_PX / 2;
             for (column, owner) in line.iter_mut().enumerate() {
-                if mask.get(column * CELL_PX + CELL_PX / 2, y).is_some_and(|number| *number > 0) {
+                if moves(column * CELL_PX + CELL_PX / 2, row * CELL_PX + CELL_PX / 2) {
                     *owner = NO_TRACK;
                 }
             }
@@ -333,6 +337,13 @@ impl BodyMask {
                 (row * self.columns + left, row * self.columns + right.min(self.columns.saturating_sub(1)));
             self.owner.get(from..=to).is_some_and(|cells| cells.iter().any(|owner| *owner != 0))
         })
+    }
+
+    /// The track whose body a position of the raw image, px, lies on.
+    pub fn body_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
+        let [column, row] = [x, y].map(|v| (v.max(0.0) as usize) / CELL_PX);
+        let owner = *self.owner.get(row * self.columns + column).filter(|_| column < self.columns)?;
+        (owner != 0 && owner != NO_TRACK).then(|| usize::from(owner) - 1)
     }
 
     /// Cells of a box grown by a share of its size: left, top, right, bottom.

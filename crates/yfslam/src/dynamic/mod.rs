@@ -14,6 +14,7 @@ mod full;
 mod none;
 mod outline;
 mod region;
+mod things;
 mod tracks;
 mod views;
 mod yf;
@@ -28,6 +29,7 @@ use crate::image::{DepthImage, GrayImage, Image};
 use crate::map::{KeyFrameId, Map};
 use crate::sensor::SensorModel;
 pub use region::{MovingMask, Region};
+pub use things::Things;
 
 /// How moving things are kept out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

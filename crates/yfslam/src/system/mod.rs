@@ -2,6 +2,7 @@
 
 mod begin;
 mod errors;
+mod found;
 mod results;
 mod times;
 
@@ -12,7 +13,7 @@ use nalgebra::Point3;
 use crate::backend::{Backend, Execution, MapOwner};
 use crate::camera::Camera;
 use crate::config::{Config, DepthSource};
-use crate::detection::{Detection, Detector, mask_of_classes};
+use crate::detection::Detector;
 use crate::detector_thread::DetectorThread;
 use crate::dynamic::{DynamicFilter, Evidence, FirstPose};
 use crate::features::{Features, OrbExtractor};
@@ -27,6 +28,7 @@ use crate::sensor::SensorModel;
 use crate::tracking::{Initialiser, TrackedFrame, Tracker, TrackingState};
 use crate::upright::Down;
 pub use errors::{FrameRejected, SetupError};
+use found::Found;
 pub use times::StageTimes;
 use times::Stopwatch;
 
@@ -87,11 +89,7 @@ pub struct Slam {
     anchors: Vec<Anchor>,
     filter: Box<dyn DynamicFilter>,
     detector: Option<DetectorThread>,
-    /// Indices of the classes that can move.
-    movable_classes: Vec<usize>,
-    movable: Vec<Detection>,
-    /// Pixels of movable objects, from a detector that segments.
-    movable_mask: Option<Image<u8>>,
+    found: Found,
     detector_failures: usize,
     /// Frames that were not refused.
     frames_seen: usize,
@@ -127,24 +125,11 @@ impl Slam {
         let backend = Backend::new(sensor.clone(), config.clone(), Map::default());
         // A method that asks for no boxes needs no detector.
         let detector = detector.filter(|_| config.dynamic.method.needs_boxes());
-        let mut movable_classes = Vec::new();
-        if let Some(detector) = &detector {
-            let known = detector.class_names();
-            for name in &config.dynamic.movable {
-                movable_classes.push(
-                    known
-                        .iter()
-                        .position(|k| k == name)
-                        .ok_or_else(|| SetupError::UnknownClass { name: name.clone(), known: known.join(", ") })?,
-                );
-            }
-        }
+        let found = Found::new(&config.dynamic, detector.as_deref())?;
         Ok(Self {
             filter: config.dynamic.method.filter(config.dynamic.seed),
             detector: detector.map(DetectorThread::spawn).transpose()?,
-            movable_classes,
-            movable: Vec::new(),
-            movable_mask: None,
+            found,
             detector_failures: 0,
             frames_seen: 0,
             last_timestamp_ns: None,
@@ -228,9 +213,9 @@ impl Slam {
         times.detector_wait = clock.lap();
         let features = &mut self.tracker.current.features;
         let evidence = Evidence {
-            movable: &self.movable,
+            movable: &self.found.movable,
             looked,
-            mask: frame.mask.as_deref().or(self.movable_mask.as_ref()),
+            mask: frame.mask.as_deref().or(self.found.mask.as_ref()),
             gray: &self.gray,
             depth: &depth,
             sensor: &self.sensor,
@@ -364,10 +349,9 @@ impl Slam {
     /// Boxes of movable objects for this frame. Returns whether anybody looked for them: not if the detector fails, is late, or none are
     /// due. Tracks carry such frames.
     fn collect_boxes(&mut self, frame: &RgbdFrame, due: bool) -> bool {
-        self.movable.clear();
-        self.movable_mask = None;
+        self.found.clear();
         if let Some(known) = &frame.detections {
-            self.movable.extend(known.iter().filter(|_| due));
+            self.found.movable.extend(known.iter().filter(|_| due));
             return due;
         }
         let Some(detector) = &mut self.detector else { return false };
@@ -376,8 +360,7 @@ impl Slam {
         match if waits { detector.finish() } else { detector.poll() } {
             None => false,
             Some(Ok(seen)) => {
-                self.movable.extend(seen.boxes.iter().filter(|d| self.movable_classes.contains(&d.class)));
-                self.movable_mask = seen.mask.as_ref().map(|mask| mask_of_classes(mask, &self.movable_classes));
+                self.found.take(seen);
                 true
             }
             Some(Err(error)) => {

@@ -2,7 +2,7 @@
 
 use super::Slam;
 use crate::detection::Detection;
-use crate::dynamic::{MovingMask, Region};
+use crate::dynamic::{MovingMask, Region, Things};
 use crate::geometry::Pose;
 use crate::image::DepthImage;
 use crate::loops::LoopClosed;
@@ -75,7 +75,7 @@ impl Slam {
 
     /// The boxes of movable objects in the last frame, at any score.
     pub fn last_boxes(&self) -> &[Detection] {
-        &self.movable
+        &self.found.movable
     }
 
     /// The parts of the last frame that were found to move.
@@ -86,6 +86,22 @@ impl Slam {
     /// What moves in the last frame, whose depth image is given, pixel by pixel.
     pub fn moving_mask(&self, depth: &DepthImage) -> MovingMask {
         self.filter.moving_mask(&self.config.dynamic, depth)
+    }
+
+    /// Names of the detector's classes, in the order of [`Detection::class`]; none without one.
+    pub fn class_names(&self) -> &[String] {
+        &self.found.class_names
+    }
+
+    /// Whether the detector knows more than what can move.
+    pub fn knows_things(&self) -> bool {
+        self.found.knows_things()
+    }
+
+    /// Outlines of what the detector found in the last frame and cannot move, beside what does, as [`Slam::moving_mask`] has it of the
+    /// same depth image. `None` where no detector that knows such things looked.
+    pub fn things(&self, depth: &DepthImage, moving: &MovingMask) -> Option<Things> {
+        self.found.things().map(|boxes| Things::outline(&self.config.dynamic, boxes, depth, moving))
     }
 
     /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.

@@ -1,0 +1,151 @@
+//! Classes in dense maps: things that a detector finds are named where they stand, and nothing else is.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    dead_code,
+    reason = "a test may, and it uses a part of what it shares"
+)]
+
+mod common;
+#[path = "../examples/dense/judge.rs"]
+mod judge;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::sync::{Arc, Mutex};
+
+use common::succeeds;
+use judge::{index_of, t_survey_world};
+use nalgebra::{Isometry3, Point3};
+use yfslam::dense::classes::classes;
+use yfslam::dense::persist::encode;
+use yfslam::dense::voxels::{Voxel, voxel_at};
+use yfslam::dense::{DenseConfig, DenseMapper, Survey, Volume, up};
+use yfslam::image::RgbImage;
+use yfslam::{Config, Detection, Detector, DetectorError, Execution, Slam};
+use yfslam_synth::{CLASS_NAMES, World, parse};
+
+/// What stands in the world, by its place in [`CLASS_NAMES`].
+const BOX: usize = 3;
+
+/// Finds what the renderer knows of the frame that is being tracked.
+struct Oracle {
+    names: Vec<String>,
+    boxes: Arc<Mutex<Vec<Detection>>>,
+}
+
+impl Detector for Oracle {
+    fn class_names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn detect(&mut self, _image: &RgbImage, out: &mut Vec<Detection>) -> Result<(), DetectorError> {
+        out.clone_from(&self.boxes.lock().unwrap());
+        Ok(())
+    }
+}
+
+/// The map of a world in which a detector finds everything exactly.
+fn survey_of(world: &World) -> Survey {
+    let boxes = Arc::new(Mutex::new(Vec::new()));
+    let oracle = Oracle { names: CLASS_NAMES.map(str::to_owned).to_vec(), boxes: boxes.clone() };
+    let camera = &world.config().camera;
+    let mut slam = Slam::new(Config::default(), camera, Some(Box::new(oracle))).unwrap();
+    let mut mapper = DenseMapper::new(&DenseConfig::default(), camera, Execution::Inline).unwrap();
+    let ids = mapper.name_classes(slam.class_names());
+    for index in 0..world.len() {
+        let shot = world.frame(index);
+        let exact = |&(_, class, bbox): &(u8, usize, _)| Detection { class, score: 0.9, bbox };
+        *boxes.lock().unwrap() = shot.boxes.iter().map(exact).collect();
+        let frame = &shot.frame;
+        let tracked = slam.track(frame).unwrap();
+        let Some(tie) = slam.last_frame().reference.filter(|_| tracked.is_keyframe) else { continue };
+        if mapper.is_due(frame.timestamp_ns, &slam.last_frame().t_cam_world.inverse()) {
+            let moving = slam.moving_mask(&frame.depth);
+            let piece = mapper.cut(&frame.color, &frame.depth, |at, edge| moving.covers(&frame.depth, at, edge));
+            let things = slam.things(&frame.depth, &moving).unwrap();
+            let class = |at| things.class_at(at).map_or(0, |class| ids[class]);
+            mapper.hang(frame.timestamp_ns, tie, piece.with_classes(&mapper.grid().clone(), class), slam.map());
+        }
+    }
+    mapper.into_survey(slam.map())
+}
+
+/// Voxels in which the exact surface of the box lies that the pieces saw.
+fn true_voxels(survey: &Survey, volume: &Volume, world: &World) -> BTreeSet<Voxel> {
+    let camera = &world.config().camera;
+    let turn = volume.pose(0).unwrap() * survey.pieces[0].t_world_cam.inverse() * t_survey_world(survey, world);
+    let mut voxels = BTreeSet::new();
+    for one in &survey.pieces {
+        let shot = world.frame(index_of(world, one.timestamp_ns));
+        let pose: Isometry3<f32> = (turn * shot.t_world_cam).cast();
+        let Some((instance, ..)) = shot.boxes.iter().find(|(_, class, _)| *class == BOX) else { continue };
+        for (v, u) in (0..camera.height).flat_map(|v| (0..camera.width).map(move |u| (v, u))) {
+            let z = *shot.exact_depth.get(u, v).unwrap();
+            if shot.instances.get(u, v) == Some(instance) && z > 0.0 && z <= volume.config().max_range_m {
+                let [x, y] = camera.undistort(u as f64, v as f64).map(|x| x as f32);
+                voxels.insert(voxel_at(&(pose * Point3::new(x * z, y * z, z)), 1.0 / volume.config().resolution_m));
+            }
+        }
+    }
+    voxels
+}
+
+/// How many voxels the box fills, how many of them are named, how many others are, and how many have the name of something else.
+fn judge_names(survey: &Survey, world: &World) -> [usize; 4] {
+    let volume = survey.volume(&DenseConfig::default(), &up::of_survey(survey), |_| {});
+    let (truth, found) = (true_voxels(survey, &volume, world), classes(survey, &volume, |_| {}));
+    let near = |[x, y, z]: Voxel| (0..27).any(|i| truth.contains(&[x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]));
+    let mut counts = [0; 4];
+    for voxel in volume.voxels().filter(|known| known.occupied).map(|known| known.voxel) {
+        let (class, stands) = (usize::from(found.get(voxel)), truth.contains(&voxel));
+        let is_named = class == BOX + 1;
+        let is = [stands, stands && is_named, !near(voxel) && is_named, class != 0 && !is_named];
+        counts.iter_mut().zip(is).for_each(|(count, is)| *count += usize::from(is));
+    }
+    counts
+}
+
+#[test]
+fn a_box_that_stands_among_walkers_is_named_and_little_else_also_if_it_is_missed_in_half_of_the_views() {
+    let config = parse("synth:walking_xyz?moved=on&width=320&height=240&frames=150&seed=4").unwrap();
+    let world = World::new(&config).unwrap();
+    let mut survey = survey_of(&world);
+    assert_eq!(survey.class_names, CLASS_NAMES);
+    let [stands, named, beyond, others] = judge_names(&survey, &world);
+    println!("{named} of {stands} voxels named, {beyond} beyond, {others} with another name");
+    assert!(stands > 100 && named * 100 >= stands * 95 && beyond * 20 <= stands && others == 0);
+
+    products_tell_them(&survey);
+
+    for one in survey.pieces.iter_mut().skip(1).step_by(2) {
+        one.piece = one.piece.clone().with_classes(&survey.grid, |_| 0);
+    }
+    let [stands, named, beyond, others] = judge_names(&survey, &world);
+    println!(
+        "missed in half of the views: {named} of {stands} voxels named, {beyond} beyond, {others} with another name"
+    );
+    assert!(named * 4 >= stands * 3 && beyond * 20 <= stands && others == 0);
+}
+
+/// `yfslam map` names them in all products that can, and says how many there are.
+fn products_tell_them(survey: &Survey) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("dense.map"), encode(survey).unwrap()).unwrap();
+    let said = succeeds(folder.path(), &["map", "dense.map", "--cloud", "--octomap", "--out", "out"]).stdout;
+    assert!(said.contains("classes, in voxels: box 1"), "{said}");
+    let read = |name: &str| fs::read(folder.path().join("out").join(name)).unwrap();
+    let head = |name: &str| String::from_utf8_lossy(&read(name)[..500]).into_owned();
+    assert!(
+        head("cloud.ply").contains("comment class 4 box\n") && head("cloud.ply").contains("property uchar class\n")
+    );
+    assert!(head("cloud.pcd").contains("FIELDS x y z rgb label\n"));
+    assert!(head("semantic.ot").contains("id ColorOcTree\n"));
+    assert!(read("classes.png").len() > 1000);
+    let legend: serde_json::Value = serde_json::from_slice(&read("classes.json")).unwrap();
+    let entry = &legend["classes"][0];
+    assert_eq!((entry["class"].as_u64(), entry["name"].as_str()), (Some(4), Some("box")));
+    let named = entry["voxels"].as_u64().unwrap();
+    assert!(said.contains(&format!("box {named}; {} unknown", legend["unknown"])), "{said}\n{legend}");
+}
