@@ -95,6 +95,16 @@ fn a_detector_that_looks_once_in_three_seconds_is_enough_to_follow_walkers() {
 }
 
 #[test]
+fn a_picture_that_people_fill_by_four_fifths_is_tracked() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = "synth:walking_static?people=6&share=0.8&frames=45";
+    succeeds(folder.path(), &["run", world, "--out", "out", "-q"]);
+    let report = report(&folder.path().join("out"));
+    assert_eq!(report["frames"]["tracked"], 45);
+    assert!(ate_rmse(&report) < 0.05, "{}", ate_rmse(&report));
+}
+
+#[test]
 fn a_recording_without_boxes_is_looked_at_by_the_network_in_the_program() {
     let folder = tempfile::tempdir().unwrap();
     record(&folder.path().join("seq"));

@@ -101,6 +101,7 @@ impl Backend {
     fn note(&mut self, sightings: &Sightings) {
         sightings.visible.iter().for_each(|id| self.map.count_visible(*id));
         sightings.found.iter().for_each(|id| self.map.count_found(*id));
+        sightings.seen_through.iter().for_each(|id| self.map.note_seen_through(*id));
     }
 
     /// Begins anew with an empty map.

@@ -23,7 +23,7 @@ impl Config {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let share = |x: f64| (0.0..=1.0).contains(&x);
         let (f, d, s, t) = (&self.features, &self.depth, &self.stereo, &self.tracking);
-        let checks: [(&'static str, String, bool, &'static str); 30] = [
+        let checks: [(&'static str, String, bool, &'static str); 32] = [
             ("features.count", f.count.to_string(), f.count > 0, "at least 1"),
             ("features.levels", f.levels.to_string(), (1..=16).contains(&f.levels), "from 1 to 16"),
             (
@@ -119,6 +119,18 @@ impl Config {
                 "dynamic.full.same_box_iou",
                 self.dynamic.full.same_box_iou.to_string(),
                 share(self.dynamic.full.same_box_iou.into()),
+                "from 0 to 1",
+            ),
+            (
+                "dynamic.full.through_m",
+                self.dynamic.full.through_m.to_string(),
+                positive(self.dynamic.full.through_m.into()),
+                "a positive length in m",
+            ),
+            (
+                "dynamic.full.through_share",
+                self.dynamic.full.through_share.to_string(),
+                share(self.dynamic.full.through_share.into()),
                 "from 0 to 1",
             ),
             (

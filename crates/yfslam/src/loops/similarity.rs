@@ -104,7 +104,7 @@ mod tests {
         for (_, landmark) in place.iter().flat_map(|id| map.keyframe(*id).unwrap().sights()) {
             let l = map.landmark(landmark).unwrap();
             if let Some(i) = located.features.descriptors.iter().position(|d| *d == l.descriptor) {
-                located.sights[i] = Some(Sight { landmark: Some(landmark), point_world: l.position });
+                located.sights[i] = Some(Sight::of(landmark, l));
             }
         }
         let place = Candidate { keyframe: place[3], group: place, matches: Vec::new() };

@@ -57,7 +57,8 @@ pub fn locate(
     frame.clear_sights();
     frame.t_cam_world = pose;
     for pair in pairs.iter().filter(|pair| pair.fits(sensor, &pose)) {
-        frame.sights[pair.feature] = Some(Sight { landmark: Some(pair.landmark), point_world: pair.point_world });
+        frame.sights[pair.feature] =
+            Some(Sight { landmark: Some(pair.landmark), point_world: pair.point_world, trust: 1.0 });
     }
     let mut inliers = frame.refine_pose(sensor, &config.pose);
     let (mut visible, mut expected) = (Vec::new(), 0.0);

@@ -53,6 +53,7 @@ impl Map {
             born,
             visible: 1,
             found: 1,
+            standing: Landmark::STANDS,
             color,
         });
         self.add_observation(id, keyframe, feature);
@@ -186,6 +187,16 @@ impl Map {
     pub fn count_found(&mut self, landmark: LandmarkId) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.found += 1;
+            l.standing = (l.standing + Landmark::FOUND).min(Landmark::STANDS);
+        }
+    }
+
+    /// Notes a frame that saw through the landmark; one that is likely gone is removed.
+    pub fn note_seen_through(&mut self, landmark: LandmarkId) {
+        let Some(l) = self.landmarks.get_mut(landmark) else { return };
+        l.standing += Landmark::SEEN_THROUGH;
+        if l.standing < Landmark::GONE {
+            self.remove_landmark(landmark);
         }
     }
 

@@ -84,7 +84,7 @@ impl Window {
                     pose,
                     point,
                     measurement: sensor.measurement(feature),
-                    trust: f64::from(feature.trust),
+                    trust: f64::from(feature.trust * landmark.trust()),
                 });
             }
         }

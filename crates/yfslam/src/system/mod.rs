@@ -15,7 +15,7 @@ use crate::camera::Camera;
 use crate::config::{Config, DepthSource};
 use crate::detection::Detector;
 use crate::detector_thread::DetectorThread;
-use crate::dynamic::{DynamicFilter, Evidence, FirstPose};
+use crate::dynamic::{DynamicFilter, Evidence, FirstPose, Method};
 use crate::features::{Features, OrbExtractor};
 use crate::frame::RgbdFrame;
 use crate::geometry::Pose;
@@ -247,7 +247,11 @@ impl Slam {
                 if estimated {
                     sharpen(self.filter.as_mut(), &mut self.tracker.current, &self.sensor, &self.config, map);
                 }
-                estimated && self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers)
+                let tracked = estimated && self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers);
+                if tracked && self.config.dynamic.method == Method::Full {
+                    self.tracker.look_through(&self.sensor, &self.config.dynamic.full, map, &depth);
+                }
+                tracked
             }
             TrackingState::Lost => {
                 let found = self.find_again();

@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use crate::config::PoseOptimizerConfig;
 use crate::features::FrameFeatures;
 use crate::geometry::Pose;
-use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
 use crate::optimize::pose_only::{PoseObservation, optimize_pose};
 use crate::sensor::SensorModel;
 
@@ -16,6 +16,15 @@ pub struct Sight {
     pub landmark: Option<LandmarkId>,
     /// Where it is in the world, m.
     pub point_world: Point3<f64>,
+    /// Probability that it still is there ([`Landmark::trust`]).
+    pub trust: f32,
+}
+
+impl Sight {
+    /// Of a landmark.
+    pub fn of(id: LandmarkId, landmark: &Landmark) -> Self {
+        Self { landmark: Some(id), point_world: landmark.position, trust: landmark.trust() }
+    }
 }
 
 /// A frame with its pose and matches. Buffers are reused from frame to frame.
@@ -75,7 +84,7 @@ impl TrackedFrame {
             self.observations.push(PoseObservation {
                 point_world: sight.point_world,
                 measurement: sensor.measurement(feature),
-                trust: f64::from(feature.trust),
+                trust: f64::from(feature.trust * sight.trust),
                 inlier: true,
             });
         }
@@ -109,7 +118,7 @@ impl TrackedFrame {
             }
             let f = &self.features.features[i as usize];
             let point = sensor.pinhole.unproject(f64::from(f.u), f64::from(f.v), f64::from(z));
-            self.sights[i as usize] = Some(Sight { landmark: None, point_world: t_world_cam * point });
+            self.sights[i as usize] = Some(Sight { landmark: None, point_world: t_world_cam * point, trust: 1.0 });
         }
     }
 
@@ -124,7 +133,7 @@ impl TrackedFrame {
         self.t_cam_world = self.pose_in(map);
         for sight in &mut self.sights {
             if let Some(Sight { landmark: Some(id), .. }) = *sight {
-                *sight = map.landmark(id).map(|l| Sight { landmark: Some(id), point_world: l.position });
+                *sight = map.landmark(id).map(|landmark| Sight::of(id, landmark));
             }
         }
     }

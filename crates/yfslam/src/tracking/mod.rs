@@ -8,10 +8,12 @@ mod initialise;
 pub mod keyframe_policy;
 mod local_map;
 pub mod search;
+mod seen_through;
 
-use crate::config::Config;
+use crate::config::{Config, FullConfig};
 use crate::features::matching::RotationHistogram;
 use crate::geometry::Pose;
+use crate::image::DepthImage;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::sensor::SensorModel;
 pub use frame::{Sight, TrackedFrame};
@@ -19,6 +21,7 @@ pub use initialise::{Initialiser, StartFrame, TwoViewStart};
 use keyframe_policy::{FrameSummary, is_keyframe_wanted};
 use local_map::LocalMap;
 use search::{search_keyframe, search_last_frame, search_local_map};
+use seen_through::is_seen_through;
 
 /// What the system knows of its place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,6 +42,8 @@ pub struct Sightings {
     pub visible: Vec<LandmarkId>,
     /// Found, and fitting the pose.
     pub found: Vec<LandmarkId>,
+    /// Not found, and what is behind them is seen.
+    pub seen_through: Vec<LandmarkId>,
 }
 
 impl Sightings {
@@ -46,6 +51,7 @@ impl Sightings {
     pub fn clear(&mut self) {
         self.visible.clear();
         self.found.clear();
+        self.seen_through.clear();
     }
 }
 
@@ -58,7 +64,9 @@ pub struct Tracker {
     /// Motion from the last frame to this one, `t_current_last`; `None` after a start or a loss.
     velocity: Option<Pose>,
     local_map: LocalMap,
+    /// Landmarks in view of the current frame, and those found in it, in order.
     visible: Vec<LandmarkId>,
+    found: Vec<LandmarkId>,
     rotation: RotationHistogram,
     reference: Option<KeyFrameId>,
     frames_since_keyframe: u64,
@@ -145,6 +153,22 @@ impl Tracker {
         self.inliers >= min_inliers
     }
 
+    /// Notes landmarks that the frame, once tracked, sees through.
+    pub fn look_through(&mut self, sensor: &SensorModel, config: &FullConfig, map: &Map, depth: &DepthImage) {
+        // As much as there can be: later frames shall not have to ask for memory.
+        self.found.clear();
+        self.found.reserve(self.visible.capacity());
+        self.sightings.seen_through.reserve(self.visible.capacity());
+        self.found.extend(self.current.sights.iter().flatten().filter_map(|sight| sight.landmark));
+        self.found.sort_unstable();
+        for &id in self.visible.iter().filter(|id| self.found.binary_search(id).is_err()) {
+            let pose = &self.current.t_cam_world;
+            if map.landmark(id).is_some_and(|l| is_seen_through(config, sensor, depth, pose, &l.position)) {
+                self.sightings.seen_through.push(id);
+            }
+        }
+    }
+
     /// Ends a tracked frame: ties it to its reference and learns the motion.
     pub fn accept(&mut self, map: &Map) {
         self.velocity = self.last.reference.map(|_| self.current.t_cam_world * self.last.t_cam_world.inverse());
@@ -192,8 +216,7 @@ impl Tracker {
         self.current.t_cam_world = k.t_cam_world;
         self.current.reference = Some((keyframe, Pose::identity()));
         for (sight, landmark) in self.current.sights.iter_mut().zip(&k.landmarks) {
-            *sight =
-                landmark.and_then(|id| Some(Sight { landmark: Some(id), point_world: map.landmark(id)?.position }));
+            *sight = landmark.and_then(|id| Some(Sight::of(id, map.landmark(id)?)));
         }
     }
 

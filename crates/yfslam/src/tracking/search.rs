@@ -183,7 +183,7 @@ pub fn search_keyframe(
         let distinct = (best.distance as f32) < config.reference_ratio * rival as f32;
         let j = best.index as usize;
         if best.distance <= config.hamming_low && distinct && current.is_open(j) {
-            current.sights[j] = Some(Sight { landmark: Some(id), point_world: landmark.position });
+            current.sights[j] = Some(Sight::of(id, landmark));
             rotation.add(keyframe.features.features[i].angle_rad - current.features.features[j].angle_rad, best.index);
         }
     }
@@ -292,7 +292,7 @@ fn match_local_map<S: Simd>(
             * if cosine > 0.998 { config.local_radius_narrow_px } else { config.local_radius_px };
         let best = best_near(current, &projector, &projection, radius, octave, &landmark.descriptor);
         if best.is_distinct_in_octave(config.hamming_high, config.local_ratio) {
-            current.sights[best.index] = Some(Sight { landmark: Some(id), point_world: landmark.position });
+            current.sights[best.index] = Some(Sight::of(id, landmark));
         }
     }
 }
