@@ -237,8 +237,8 @@ config_section! {
         whole_share: f32 = 0.9,
         /// Share of its box that shows something nearer when a body is hidden, not gone.
         hidden_share: f32 = 0.5,
-        /// A landmark stands there no more if what is seen all around is farther by this, m,
-        through_m: f32 = 0.1,
+        /// A landmark stands there no more if what is seen all around is farther by this, m: most of what moves stands clear of walls,
+        through_m: f32 = 0.3,
         /// and this share of its depth.
         through_share: f32 = 0.08,
     }

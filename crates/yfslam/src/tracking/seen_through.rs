@@ -11,7 +11,7 @@ use crate::image::DepthImage;
 use crate::sensor::SensorModel;
 
 /// Distance at which depth around the landmark is read too, px: corners often are at an edge.
-const AROUND_PX: f64 = 4.0;
+const AROUND_PX: f64 = 8.0;
 
 /// Whether a frame sees through a point of the world, all around.
 pub fn is_seen_through(
