@@ -73,9 +73,13 @@ fn a_map_is_found_back_into_and_stays_as_it_is_or_grows() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), &["run", DESK, "--save-map", "desk.map", "--out", "a", "-q"]);
     let before = fs::read(folder.path().join("desk.map")).unwrap();
+    // Noise is enough for a landmark to seem gone.
+    let eager = "[dynamic.full]\nthrough_m = 0.001\nthrough_share = 0.0\n";
+    fs::write(folder.path().join("eager.toml"), eager).unwrap();
     let again = ["run", DESK, "--load-map", "desk.map", "--reverse", "-q"];
-    succeeds(folder.path(), &[&again[..], &["--localise", "--out", "b"]].concat());
+    succeeds(folder.path(), &[&again[..], &["--localise", "--config", "eager.toml", "--out", "b"]].concat());
     let (mapped, localised) = (report(&folder.path().join("a")), report(&folder.path().join("b")));
+    assert_eq!(localised["map"]["landmarks"], mapped["map"]["landmarks"], "none is forgotten");
     assert_eq!(localised["frames"]["tracked"], 90);
     assert_eq!(localised["map"]["keyframes"], 0, "no keyframe is of this run");
     let (mapped, localised) = (ate_rmse(&mapped), ate_rmse(&localised));

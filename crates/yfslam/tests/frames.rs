@@ -112,3 +112,38 @@ fn stereo_depth_is_baseline_times_focal_length_by_disparity_the_same_on_every_ru
     // Of so many like corners not always the same are chosen in both pictures.
     assert!(found * 2 > all && right * 50 > found * 49, "{right} right of {found} found of {all}");
 }
+
+/// A wall 1.8 m away, before it a thing 1 m away or, later, other parts of the wall.
+fn with_thing(timestamp_ns: i64, thing: bool) -> RgbdFrame {
+    let mut frame = frame(timestamp_ns, 640);
+    let (mut color, mut depth) = (frame.color.as_ref().clone(), frame.depth.as_ref().clone());
+    for y in 160..320 {
+        // Something else to see than in the rest, and than before.
+        let from = if thing { y - 150 } else { y + 150 };
+        let other = frame.color.row(from)[7..167].to_vec();
+        color.row_mut(y)[240..400].copy_from_slice(&other);
+        if thing {
+            depth.raw.row_mut(y)[240..400].fill(5000);
+        }
+    }
+    (frame.color, frame.depth, frame.mask) = (Arc::new(color), Arc::new(depth), None);
+    frame
+}
+
+#[test]
+fn full_forgets_what_is_gone_after_half_a_second_and_nothing_that_stands() {
+    for (method, forgets) in [(Method::Full, true), (Method::None, false)] {
+        let mut config = Config::default();
+        config.dynamic.method = method;
+        let mut slam = Slam::new(config, &camera(), None).unwrap();
+        let mut see = |i: i64, thing: bool| {
+            assert!(slam.track(&with_thing(i * 33_000_000, thing)).unwrap().t_world_cam.is_some());
+            let near = slam.map().landmarks().filter(|(_, l)| l.position.z < 1.2).count();
+            (near, slam.map().landmarks().count())
+        };
+        let (things, all) = (0..5).map(|i| see(i, true)).last().unwrap();
+        assert!(things > 30 && all > things + 200, "{things} {all}");
+        let (left, others) = (5..25).map(|i| see(i, false)).last().unwrap();
+        assert!((left == 0) == forgets && others >= all - things, "{method:?}: {left} {others}");
+    }
+}

@@ -386,5 +386,8 @@ fn memory_bound(config: &DenseConfig, survey: &Survey) -> String {
     let bound_mb = Volume::bytes_at_most(config, survey).div_ceil(1_000_000);
     let allowed_mb = config.max_memory_mb;
     let map_mb = bound_mb.min(allowed_mb);
-    format!("at {} m the map takes {map_mb} MB at most, and a product {allowed_mb} MB beside it", config.resolution_m)
+    format!(
+        "at {} m the map takes {map_mb} MB at most (dense.max_memory_mb allows {allowed_mb}, and as much for a product beside it)",
+        config.resolution_m
+    )
 }

@@ -40,14 +40,17 @@ pub struct Landmark {
 }
 
 impl Landmark {
-    /// Log-odds of a landmark that nothing speaks against, and the most that is kept: OctoMap's (Hornung et al., Autonomous Robots
-    /// 2013) for 0.97, and below for hits of 0.7, misses of 0.4 and the least, 0.12.
+    /// Log-odds of a landmark that nothing speaks against, and the most that is kept: those of OctoMap's greatest probability, 0.97
+    /// (Hornung et al., Autonomous Robots 2013).
     pub const STANDS: f32 = 3.48;
+    /// What a frame that found it adds: OctoMap's hit, 0.7.
     pub(crate) const FOUND: f32 = 0.85;
+    /// What a frame that saw through it adds: OctoMap's miss, 0.4.
     pub(crate) const SEEN_THROUGH: f32 = -0.41;
+    /// Below, it is gone: OctoMap's least probability, 0.12.
     pub(crate) const GONE: f32 = -1.99;
 
-    /// Probability that it still stands where it was, by that of a landmark that nothing speaks against.
+    /// Probability that it still stands where it was, as a share of that of a landmark that nothing speaks against.
     pub fn trust(&self) -> f32 {
         (1.0 + (-Self::STANDS).exp()) / (1.0 + (-self.standing).exp())
     }

@@ -4,7 +4,6 @@ use super::Slam;
 use crate::backend::Inserted;
 use crate::frame::RgbdFrame;
 use crate::map::KeyFrameId;
-use crate::system::MapUse;
 use crate::tracking::TrackingState;
 use crate::upright::Down;
 
@@ -31,7 +30,7 @@ impl Slam {
     /// Whether the camera has seen enough for a map for a while, and nothing in it was recognised. Time in which there was nothing to
     /// see does not count.
     pub(super) fn is_elsewhere(&mut self) -> bool {
-        if self.map_use == Some(MapUse::Localise) {
+        if self.is_map_frozen() {
             return false;
         }
         self.unknown_frames += usize::from(self.has_enough_to_start());

@@ -248,7 +248,7 @@ impl Slam {
                     sharpen(self.filter.as_mut(), &mut self.tracker.current, &self.sensor, &self.config, map);
                 }
                 let tracked = estimated && self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers);
-                if tracked && self.config.dynamic.method == Method::Full {
+                if tracked && self.config.dynamic.method == Method::Full && !self.is_map_frozen() {
                     self.tracker.look_through(&self.sensor, &self.config.dynamic.full, map, &depth);
                 }
                 tracked
@@ -441,10 +441,14 @@ impl Slam {
         (forgotten <= 1.0).then_some(reach)
     }
 
+    /// Whether the map stays as it is.
+    fn is_map_frozen(&self) -> bool {
+        self.map_use == Some(MapUse::Localise)
+    }
+
     /// Whether the frame is to become a keyframe, and can.
     fn wants_keyframe(&mut self) -> bool {
-        let frozen = self.map_use == Some(MapUse::Localise);
-        if frozen || !self.tracker.wants_keyframe(&self.sensor, &self.config, self.owner.map()) {
+        if self.is_map_frozen() || !self.tracker.wants_keyframe(&self.sensor, &self.config, self.owner.map()) {
             return false;
         }
         let free = self.owner.is_free();
