@@ -8,8 +8,12 @@ A mosaic (Bochkovskiy et al., 2020) fills four parts of the canvas with four pic
 import cv2
 import numpy as np
 
+from . import clutter
+
 VISIBLE = 0.15  # of a cut person's box must remain for it to count; below, its place teaches nothing
 LEAST_SIDE = 9.0  # px
+CLOSE = 0.35  # of the pictures with people that are no mosaic show one of them close, mostly cut by the left or the right edge
+CLUTTER = 0.5  # of the pictures without people are strewn with drawn things, and half as many of those with people
 EMPTY = 0.45  # of the pictures lose everybody: a part is taken that shows nobody
 
 
@@ -21,8 +25,8 @@ def angle(rng):
     return rng.uniform(-45, 45) if kind < 0.9 else rng.uniform(-100, 100)
 
 
-def matrix(rng, boxes, source, width, height, zoom, theta):
-    """The affine map from a `source` px square picture onto a width x height canvas."""
+def matrix(rng, boxes, source, width, height, zoom, theta, cut=False):
+    """The affine map from a `source` px square picture onto a width x height canvas; `cut`: its left or right edge goes through somebody."""
     scale = zoom * np.sqrt(width * height) / source
     before, after = np.exp(rng.uniform(-0.25, 0.35)), np.exp(rng.uniform(-0.4, 0.2))
     cos, sin = np.cos(np.radians(theta)), np.sin(np.radians(theta))
@@ -31,11 +35,15 @@ def matrix(rng, boxes, source, width, height, zoom, theta):
     linear = scale * np.diag([after**0.5, after**-0.5]) @ turn @ np.diag([flip * before**0.5, before**-0.5])
     # a point of the picture, mostly one of a person, goes to a random point of the canvas: people cut by every edge
     anchor = rng.uniform(0, source, 2)
-    if len(boxes) and rng.random() < 0.7:
+    if len(boxes) and (cut or rng.random() < 0.7):
         x0, y0, x1, y1 = boxes[rng.integers(len(boxes)), 1:5] * source
-        anchor = np.array([rng.uniform(x0, x1), rng.uniform(y0, y1)])
+        margin = 0.2 if cut else 0.0  # less than a fifth of a person may show nothing of him
+        anchor = np.array([x0, y0]) + rng.uniform(margin, 1 - margin, 2) * (x1 - x0, y1 - y0)
     size = np.array([width, height], float)
-    shift = rng.uniform(0, 1, 2) * size - linear @ anchor
+    goal = rng.uniform(0, 1, 2) * size
+    if cut:  # by the edge that lies on the same side in the picture, or the picture would have to end within the canvas
+        goal[0] = 0 if (linear @ (anchor - source / 2))[0] < 0 else width
+    shift = goal - linear @ anchor
     # no needless border: a picture larger than the canvas covers it, a smaller one lies within
     corners = linear @ (np.array([[0, 1, 0, 1], [0, 0, 1, 1]]) * source)
     low, high = corners.min(1), corners.max(1)
@@ -135,10 +143,17 @@ def sample(rng, draw, side, mosaic=0.35, strength=1.0):
         image, boxes = draw(rng)
         if rng.random() < EMPTY:
             image, boxes = without_people(rng, image, boxes)
+        if rng.random() < strength * CLUTTER * (0.5 if len(boxes) else 1):
+            image = clutter.strew(rng, image, boxes)
         single = len(spans) == 1
         zoom = np.exp(rng.uniform(np.log(0.65), np.log(2.3))) if single else np.exp(rng.uniform(np.log(0.8), np.log(1.8)))
         zoom *= (352 / side) ** 0.3
-        affine = matrix(rng, boxes, image.shape[0], x1 - x0, y1 - y0, zoom, strength * angle(rng))
+        cut = False
+        if single and len(boxes) and rng.random() < strength * CLOSE:
+            height = rng.choice(boxes[:, 4] - boxes[:, 2])
+            zoom = np.clip(np.exp(rng.uniform(np.log(0.7), np.log(2.0))) / height, 0.65, 3.0)
+            cut = rng.random() < 0.7
+        affine = matrix(rng, boxes, image.shape[0], x1 - x0, y1 - y0, zoom, strength * angle(rng), cut)
         canvas[y0:y1, x0:x1] = cv2.warpAffine(image, affine, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR, borderValue=border)
         affine[:, 2] += (x0, y0)
         good, bad = place(boxes, affine, image.shape[0], np.array([x0, y0, x1, y1], float))

@@ -8,6 +8,8 @@ class Config:
     classes: list = dataclasses.field(default_factory=lambda: ["person"])
     # widths and heights, px of the 352 px input, fine grid first; from train.anchors
     anchors: list = dataclasses.field(default_factory=lambda: [[[20, 40], [32, 90], [69, 57]], [[59, 136], [110, 139], [182, 274]]])
+    # channels of the stem, of the three stages and of the pyramid; 24 48 96 192 72 is the size of the paper's network
+    widths: list = dataclasses.field(default_factory=lambda: [24, 48, 96, 192, 72])
     seed: int = 1
     batch: int = 32
     rate: float = 2e-3

@@ -6,6 +6,7 @@
 """
 
 import argparse
+import dataclasses
 import json
 import pathlib
 
@@ -15,6 +16,7 @@ import torch
 from torch import nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
+from .config import Config
 from .decode import SIDE
 from .model import YoloFastestV2
 
@@ -24,9 +26,10 @@ NAMES = ["reg_22", "obj_22", "cls_22", "reg_11", "obj_11", "cls_11"]
 def load(path):
     """The averaged network of a checkpoint, ready to evaluate, and its settings."""
     state = torch.load(path, weights_only=False, map_location="cpu")
-    model = YoloFastestV2(len(state["config"]["classes"]))
+    config = Config(**state["config"])
+    model = YoloFastestV2(len(config.classes), config.widths)
     model.load_state_dict(state["mean"])
-    return model.eval(), state["config"]
+    return model.eval(), dataclasses.asdict(config)
 
 
 def fold(module):

@@ -125,15 +125,15 @@ def train(rank, world, options):
         name, value = setting.split("=", 1)
         setattr(config, name, type(getattr(config, name))(eval(value, {})))
     torch.manual_seed(config.seed)
-    model = YoloFastestV2(len(config.classes)).to(memory_format=torch.channels_last)
+    model = YoloFastestV2(len(config.classes), config.widths).to(memory_format=torch.channels_last)
     mean = copy.deepcopy(model)
     optimizer = torch.optim.AdamW(parameter_groups(model, config.weight_decay), lr=config.rate, fused=True)
     step = seen = 0
     if state:
-        same = len(state["model"]["cls.bias"]) == len(config.classes)
+        same = state["optimizer"] and len(state["model"]["cls.bias"]) == len(config.classes)
         adopt(model, state["model"])
         adopt(mean, state["mean"])
-        if same:  # else the moments do not fit and start anew
+        if same:  # else there are no moments that fit, and they start anew
             optimizer.load_state_dict(state["optimizer"])
         step, seen = state["step"], state["seen"]
     decay = (seen, seen + options.decay) if options.decay else None

@@ -12,7 +12,7 @@ from torch import nn
 
 STRIDES = (16, 32)
 ANCHORS_PER_GRID = 3
-PYRAMID = 72
+UNITS = (4, 8, 4)  # of the three stages
 
 
 def conv(inputs, outputs, kernel=1, stride=1, groups=1, relu=True):
@@ -49,24 +49,27 @@ class Down(nn.Module):
 class Head(nn.Sequential):
     """Two separable 5x5 convolutions."""
 
-    def __init__(self, channels=PYRAMID):
+    def __init__(self, channels):
         half = lambda: conv(channels, channels, 5, groups=channels) + conv(channels, channels, relu=False)
         super().__init__(*half(), *half())
 
 
 class YoloFastestV2(nn.Module):
-    """See the module's text. `prior` is the objectness that every cell starts with."""
+    """See the module's text. `widths`: channels of the stem, of the three stages and of the pyramid; `prior`: the objectness that every
+    cell starts with."""
 
-    def __init__(self, classes=1, prior=0.01):
+    def __init__(self, classes=1, widths=(24, 48, 96, 192, 72), prior=0.01):
         super().__init__()
-        self.stem = nn.Sequential(*conv(3, 24, 3, 2), nn.MaxPool2d(3, 2, 1))
-        stage = lambda inputs, outputs, units: nn.Sequential(Down(inputs, outputs), *(Unit(outputs) for _ in range(units - 1)))
-        self.stage2, self.stage3, self.stage4 = stage(24, 48, 4), stage(48, 96, 8), stage(96, 192, 4)
-        self.reduce16, self.reduce32 = nn.Sequential(*conv(288, PYRAMID)), nn.Sequential(*conv(192, PYRAMID))
-        self.boxes16, self.objects16, self.boxes32, self.objects32 = Head(), Head(), Head(), Head()
-        self.reg = nn.Conv2d(PYRAMID, 4 * ANCHORS_PER_GRID, 1)
-        self.obj = nn.Conv2d(PYRAMID, ANCHORS_PER_GRID, 1)
-        self.cls = nn.Conv2d(PYRAMID, classes, 1)
+        *stages, pyramid = widths
+        self.stem = nn.Sequential(*conv(3, stages[0], 3, 2), nn.MaxPool2d(3, 2, 1))
+        self.stage2, self.stage3, self.stage4 = (
+            nn.Sequential(Down(inputs, outputs), *(Unit(outputs) for _ in range(units - 1)))
+            for inputs, outputs, units in zip(stages, stages[1:], UNITS))
+        self.reduce16, self.reduce32 = nn.Sequential(*conv(sum(stages[-2:]), pyramid)), nn.Sequential(*conv(stages[-1], pyramid))
+        self.boxes16, self.objects16, self.boxes32, self.objects32 = (Head(pyramid) for _ in range(4))
+        self.reg = nn.Conv2d(pyramid, 4 * ANCHORS_PER_GRID, 1)
+        self.obj = nn.Conv2d(pyramid, ANCHORS_PER_GRID, 1)
+        self.cls = nn.Conv2d(pyramid, classes, 1)
         for output in (self.reg, self.obj, self.cls):
             nn.init.normal_(output.weight, std=0.01)
             nn.init.zeros_(output.bias)

@@ -1,0 +1,77 @@
+"""Things that are nobody, drawn over pictures: dark and light slabs, sheets with lines, jars of pens, blobs.
+
+Photos of people hold few desks, screens and shelves; a network that has seen little of them takes what stands upright and is
+coloured, or large and dark, for somebody. The shapes are simple on purpose: none of them looks like a person.
+"""
+
+import cv2
+import numpy as np
+
+
+def paint(rng):
+    """Half of all things are grey or nearly so."""
+    value = rng.choice([rng.uniform(0, 60), rng.uniform(0, 255), rng.uniform(190, 255)])
+    spread = rng.choice([6.0, 90.0])
+    return tuple(np.clip(value + rng.uniform(-spread, spread, 3), 0, 255).tolist())
+
+
+def slab(rng, image, centre, size):
+    """A turned rectangle, at times in perspective, with a rim: screens, boxes, books, shelves."""
+    turn = np.radians(rng.normal(0, 12))
+    axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (1 + rng.normal(0, 0.08, (4, 2)))
+    corners = np.rint(centre + (corners * size / 2) @ axes).astype(np.int32)
+    cv2.fillConvexPoly(image, corners, paint(rng), cv2.LINE_AA)
+    if rng.random() < 0.6:
+        cv2.polylines(image, [corners], True, paint(rng), int(rng.integers(1, 6)), cv2.LINE_AA)
+    return corners
+
+
+def sheet(rng, image, centre, size):
+    """A slab with lines: pages, keyboards, racks."""
+    a, b, c, d = slab(rng, image, centre, size).astype(float)
+    colour, rows = paint(rng), int(rng.integers(2, 14))
+    for row in (np.arange(rows) + 0.5) / rows:
+        start, end = a + (d - a) * row, b + (c - b) * row
+        left, right = rng.uniform(0.02, 0.2), rng.uniform(0.5, 0.98)
+        at = lambda share: np.rint(start + (end - start) * share).astype(int).tolist()
+        cv2.line(image, at(left), at(right), colour, int(rng.integers(1, 4)), cv2.LINE_AA)
+
+
+def jar(rng, image, centre, size):
+    """A bundle of coloured sticks in a vessel: pens, tools, bottles, cables."""
+    foot = centre + (0, 0.1 * size[1])
+    for _ in range(rng.integers(2, 12)):
+        tip = centre + rng.uniform(-0.5, 0.5, 2) * size * (1, 0.3) - (0, 0.4 * size[1])
+        base = foot + rng.uniform(-0.3, 0.3, 2) * size * (1, 0.2)
+        colour, width = paint(rng), max(1, int(size[0] * rng.uniform(0.04, 0.2)))
+        cv2.line(image, np.rint(base).astype(int).tolist(), np.rint(tip).astype(int).tolist(), colour, width, cv2.LINE_AA)
+    slab(rng, image, foot + (0, 0.2 * size[1]), size * (0.8, 0.5))
+
+
+def blob(rng, image, centre, size):
+    """An ellipse, shaded by a second one: cups, lamps, fruit, wheels, bags."""
+    angle = float(rng.uniform(0, 180))
+    for share in (1.0, rng.uniform(0.4, 0.9)):
+        axes = np.maximum(size * share / 2, 1).astype(int).tolist()
+        cv2.ellipse(image, np.rint(centre).astype(int).tolist(), axes, angle, 0, 360, paint(rng), -1, cv2.LINE_AA)
+
+
+def hides(centre, size, boxes):
+    """Whether a thing would cover more than a fifth of anybody; boxes [n, 4] in px."""
+    low, high = np.maximum(centre - 0.6 * size, boxes[:, :2]), np.minimum(centre + 0.6 * size, boxes[:, 2:])
+    return (np.maximum(high - low, 0).prod(1) > 0.2 * (boxes[:, 2:] - boxes[:, :2]).prod(1)).any()
+
+
+def strew(rng, image, boxes):
+    """A copy of the square picture with up to 16 things on it, the larger ones first, beside the people in `boxes` (relative). Pictures
+    of people need them too, or drawn things would tell that nobody is there."""
+    image = np.ascontiguousarray(image).copy()
+    count = int(rng.integers(2, 17))
+    sides = np.sort(np.exp(rng.uniform(np.log(0.06), np.log(0.8), count)))[::-1] * image.shape[0]
+    for side in sides:
+        thing = (slab, sheet, jar, blob)[rng.integers(4)]
+        centre, size = rng.uniform(0, image.shape[0], 2), side * np.exp(rng.normal(0, 0.35, 2))
+        if not hides(centre, size, boxes[:, 1:5] * image.shape[0]):
+            thing(rng, image, centre, size)
+    return image
