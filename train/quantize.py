@@ -1,6 +1,9 @@
 """What 8-bit integers would cost an exported network: rounds weights and activations as integer arithmetic would, and evaluates.
 
-    python -m train.quantize RUNS/persons person.onnx
+    python -m train.quantize RUNS/persons person.onnx --out person.onnx
+
+With --out, the file is written again with the scales of what 1x1 convolutions read (least square error) in its metadata: the runtime can
+then compute these in integers (`--integers`).
 
 Weights: symmetric, a scale for each output channel. What enters a convolution: unsigned, a scale and an offset for each tensor, from
 pictures that were trained on (Krishnamoorthi, Quantizing deep convolutional networks for efficient inference, arXiv 1806.08342). Sums are kept
@@ -132,11 +135,27 @@ def quantized(model, ranges, how, left):
     return model
 
 
+def describe(model, ranges):
+    """The scales in the metadata, on each line the name of a convolution, the step and the zero of what it reads."""
+    weights = {tensor.name: numpy_helper.to_array(tensor) for tensor in plain(copy.deepcopy(model)).graph.initializer}
+    lines = []
+    for node in model.graph.node:
+        if node.op_type == "Conv" and kind(node, model.graph, weights) == "1x1":
+            step, zero = scale(*interval("square", *ranges[node.input[0]]))
+            lines.append(f"{node.name} {step:.8g} {zero}")
+    kept = [entry for entry in model.metadata_props if entry.key != "scales"]
+    del model.metadata_props[:]
+    model.metadata_props.extend([*kept, onnx.StringStringEntryProto(key="scales", value="\n".join(lines))])
+    return model
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cache", type=pathlib.Path)
     parser.add_argument("model", type=pathlib.Path)
     parser.add_argument("--pictures", type=int, default=300, help="from which the ranges of activations are taken")
+    parser.add_argument("--out", type=pathlib.Path, help="write the model with the scales of what its 1x1 convolutions read")
+    parser.add_argument("--quick", action="store_true", help="do not evaluate")
     options = parser.parse_args()
     learnt, cache = Cache(options.cache, ["person"]), Cache(options.cache, ["person"], held_out=True)
     chosen = np.sort(np.random.default_rng(0).choice(learnt.chosen, options.pictures, replace=False))
@@ -144,7 +163,10 @@ def main():
     print("multiply-adds:", " ".join(f"{name} {share:.3f}" for name, share in work(model).items()))
     read = dict.fromkeys(node.input[0] for node in model.graph.node if node.op_type == "Conv")
     ranges = collect(model, list(read), [np.array(learnt.images[i]) for i in chosen])
-    for name, (how, left) in VARIANTS.items():
+    if options.out:
+        onnx.save(describe(onnx.load(options.model), ranges), options.out)
+        print(f"{options.out}: {options.out.stat().st_size} bytes")
+    for name, (how, left) in VARIANTS.items() if not options.quick else ():
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder, "changed.onnx")
             onnx.save(quantized(model, ranges, how, left), path)

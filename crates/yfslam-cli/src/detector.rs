@@ -34,6 +34,10 @@ pub struct DetectorArgs {
     /// Names of the network's classes, in its order [default: those in the file, else those of COCO].
     #[arg(long, value_name = "NAME,NAME", value_delimiter = ',', requires = "detector")]
     pub detector_classes: Vec<String>,
+    /// Compute most of the network with integers of 8 bits: faster on processors with AVX-512 VNNI, a little less accurate, the
+    /// same boxes everywhere.
+    #[arg(long)]
+    pub integers: bool,
 }
 
 /// A network.
@@ -63,13 +67,16 @@ pub struct ModelIdentity {
     pub sha256: String,
     /// Number of classes it knows.
     pub classes: usize,
+    /// Whether it computes with integers of 8 bits.
+    pub integers: bool,
 }
 
 impl fmt::Display for ModelIdentity {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let name = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
         let start = self.sha256.get(..SHORT_HASH).unwrap_or(&self.sha256);
-        write!(f, "{name} network (SHA-256 {start}…, {} kB)", self.bytes.div_ceil(1000))
+        let arithmetic = if self.integers { ", integers" } else { "" };
+        write!(f, "{name} network (SHA-256 {start}…, {} kB{arithmetic})", self.bytes.div_ceil(1000))
     }
 }
 
@@ -118,7 +125,8 @@ pub fn load_for(args: &DetectorArgs, config: &Config) -> Result<LoadedDetector> 
 /// # Errors
 /// The file cannot be read, is no ONNX model, or holds another network.
 pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetector> {
-    let config = DetectorConfig { class_names: args.detector_classes.clone(), ..config };
+    let (class_names, integers) = (args.detector_classes.clone(), args.integers);
+    let config = DetectorConfig { class_names, integers, ..config };
     let (network, file, bytes): (Box<dyn Network>, _, _) = match &args.detector {
         None | Some(Model::Embedded) => {
             (Box::new(YoloFastestV2::embedded(&config)?), EMBEDDED.into(), EMBEDDED_MODEL.into())
@@ -130,8 +138,8 @@ pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetecto
             (network, file.clone(), Cow::from(bytes))
         }
     };
-    let identity =
-        ModelIdentity { file, bytes: bytes.len(), sha256: sha256(&bytes), classes: network.class_names().len() };
+    let (sha256, classes) = (sha256(&bytes), network.class_names().len());
+    let identity = ModelIdentity { file, bytes: bytes.len(), sha256, classes, integers };
     let (sender, times) = channel();
     Ok(LoadedDetector { detector: Box::new(Timed { network, times: sender }), times, identity })
 }

@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn boxes_are_outlined_in_the_colour_of_their_class_with_a_bar_as_long_as_the_score() {
-        let model = ModelIdentity { file: "x".into(), bytes: 1, sha256: String::new(), classes: 2 };
+        let model = ModelIdentity { file: "x".into(), bytes: 1, sha256: String::new(), classes: 2, integers: false };
         let list = FoundList {
             yfslam: "",
             model: &model,
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn what_shows_an_object_is_tinted_in_the_colour_of_its_class_and_listed_in_runs() {
-        let model = ModelIdentity { file: "x".into(), bytes: 1, sha256: String::new(), classes: 1 };
+        let model = ModelIdentity { file: "x".into(), bytes: 1, sha256: String::new(), classes: 1, integers: false };
         let list =
             FoundList { yfslam: "", model: &model, score_threshold: 0.3, classes: vec!["person"], images: vec![] };
         // Of two objects, 1 in the upper and 2 in the lower half of a box, the second is drawn.

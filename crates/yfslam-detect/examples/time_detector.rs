@@ -1,7 +1,7 @@
 //! Times the forward pass and the whole `detect` on one thread: process CPU time of every run, as one JSON line per
 //! instruction set; `benches/peers_detector.py` compares it with other engines.
 //!
-//! `cargo run --release -p yfslam-detect --example time_detector -- model.onnx [runs]`
+//! `cargo run --release -p yfslam-detect --example time_detector -- model.onnx [runs [integers]]`
 #![allow(clippy::print_stdout, reason = "the result goes to standard output")]
 
 use std::error::Error;
@@ -16,10 +16,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let model = arguments.next().ok_or("the path of an ONNX model is missing")?;
     let runs: usize = arguments.next().map_or(Ok(200), |runs| runs.parse())?;
+    let integers = arguments.next().is_some_and(|word| word == "integers");
     let pixels = (0..640 * 480_usize).map(|index| [index, index / 7, index / 640].map(|value| value as u8)).collect();
     let image = RgbImage::from_vec(640, 480, pixels).ok_or("the test image has the wrong size")?;
     for level in available_levels() {
-        let mut detector = YoloFastestV2::load(Path::new(&model), &DetectorConfig::default())?.with_level(level);
+        let config = DetectorConfig { integers, ..DetectorConfig::default() };
+        let mut detector = YoloFastestV2::load(Path::new(&model), &config)?.with_level(level);
         let (height, width) = detector.input_size();
         let input: Vec<f32> = (0..3 * height * width).map(|index| (index * 37 % 256) as f32 / 255.0).collect();
         let mut found = Vec::new();

@@ -4,6 +4,7 @@ use fearless_simd::Level;
 
 use crate::ModelError;
 use crate::graph::{Kind, Layer, Network};
+use crate::kernels::integers::{self, IntegerMatrix};
 use crate::kernels::matmul::{self, Matrix, Rows};
 use crate::kernels::{WIDEST, depthwise, stem, upsample};
 use crate::memory::Memory;
@@ -20,6 +21,8 @@ pub(crate) struct Plan {
     memory: Memory,
     /// For the step that runs.
     scratch: Memory,
+    /// For the step that runs, if it computes in integers.
+    words: Vec<i32>,
     steps: Vec<Step>,
     input: Vec<usize>,
     /// Height and width of the input, px.
@@ -48,18 +51,25 @@ struct Step {
 enum Operation {
     Stem { geometry: stem::Geometry, matrix: Matrix },
     Pointwise { matrix: Matrix, addend: Vec<usize>, length: usize },
+    Integers { matrix: IntegerMatrix, addend: Vec<usize>, length: usize },
     Depthwise { geometry: depthwise::Geometry, weights: Vec<f32>, bias: Vec<f32>, relu: bool },
     Upsample { size: (usize, usize) },
 }
 
 impl Plan {
-    /// Places `network`; `name` is what errors call it.
-    pub(crate) fn new(name: &str, network: Network, level: Level) -> Result<Self, ModelError> {
+    /// Places `network`, which computes in integers what it can if `integers` says so; `name` is what errors call it.
+    pub(crate) fn new(name: &str, network: Network, level: Level, integers: bool) -> Result<Self, ModelError> {
+        if integers && network.layers.iter().all(|layer| layer.scale.is_none()) {
+            let what =
+                "it does not say how to compute with integers (`integers`); `python -m train.quantize` measures that";
+            return Err(ModelError::Mismatch { model: name.into(), what: what.into() });
+        }
         let mut places = Places::new(&network);
         let input = places.planes(&network.input, 0, 0);
         let layers = network.layers.iter().enumerate();
-        let steps: Vec<Step> = layers.map(|(time, layer)| step(&network, layer, time, &mut places)).collect();
+        let steps: Vec<Step> = layers.map(|(time, layer)| step(&network, layer, time, &mut places, integers)).collect();
         let scratch = steps.iter().map(|step| step.operation.scratch()).max().unwrap_or(0);
+        let words = steps.iter().map(|step| step.operation.words()).max().unwrap_or(0);
         if places.end() + scratch > MAX_MEMORY {
             let mebibytes = (places.end() + scratch) >> 18;
             let what = format!("the network needs {mebibytes} MiB of working memory; it is no small detector");
@@ -75,6 +85,7 @@ impl Plan {
             // Vectors may read past the end of the last plane.
             memory: Memory::new(places.end() + 4 * WIDEST),
             scratch: Memory::new(scratch),
+            words: vec![0; words],
             steps,
             input,
             input_size: network.planes[network.input[0]],
@@ -106,6 +117,10 @@ impl Plan {
                     let rows = Rows { inputs, outputs, addend, keep_larger: false, length: *length };
                     matmul::multiply(level, memory, matrix, rows);
                 }
+                Operation::Integers { matrix, addend, length } => {
+                    let rows = Rows { inputs, outputs, addend, keep_larger: false, length: *length };
+                    integers::multiply(level, memory, &mut self.words, matrix, rows);
+                }
                 Operation::Depthwise { geometry, weights, bias, relu } => {
                     let planes = depthwise::Planes { inputs, outputs, weights, bias, relu: *relu };
                     depthwise::convolve(level, memory, scratch, geometry, planes);
@@ -118,7 +133,12 @@ impl Plan {
 
 impl Operation {
     /// What computes `layer`, whose inputs have `size`.
-    fn new(layer: &Layer, size: (usize, usize), places: &Places) -> Self {
+    fn new(layer: &Layer, size: (usize, usize), places: &Places, integers: bool) -> Self {
+        let addend = |rows: usize| {
+            let mut addend = places.offsets(&layer.addend);
+            addend.resize(if addend.is_empty() { 0 } else { rows }, 0);
+            addend
+        };
         let matrix = || Matrix::pack(&layer.weights, &layer.bias, layer.relu);
         match layer.kind {
             Kind::Dense | Kind::Stem => {
@@ -127,10 +147,15 @@ impl Operation {
                 Operation::Stem { geometry, matrix }
             }
             Kind::Pointwise => {
+                let length = size.0 * size.1;
+                if let Some(scale) = layer.scale.filter(|_| integers) {
+                    let matrix = IntegerMatrix::pack(&layer.weights, &layer.bias, layer.relu, scale);
+                    let addend = addend(matrix.padded_rows());
+                    return Operation::Integers { matrix, addend, length };
+                }
                 let matrix = matrix();
-                let mut addend = places.offsets(&layer.addend);
-                addend.resize(if addend.is_empty() { 0 } else { matrix.padded_rows() }, 0);
-                Operation::Pointwise { matrix, addend, length: size.0 * size.1 }
+                let addend = addend(matrix.padded_rows());
+                Operation::Pointwise { matrix, addend, length }
             }
             Kind::Depthwise { kernel, stride } => {
                 let by_column = |filter: &[f32]| -> Vec<f32> {
@@ -152,15 +177,29 @@ impl Operation {
             _ => 0,
         }
     }
+
+    /// Words of scratch memory for integers.
+    fn words(&self) -> usize {
+        match self {
+            Operation::Integers { matrix, length, .. } => matrix.scratch(*length),
+            _ => 0,
+        }
+    }
+
+    /// Rows that are written beyond those of the layer.
+    fn padding(&self, rows: usize) -> usize {
+        match self {
+            Operation::Pointwise { matrix, .. } => matrix.padded_rows() - rows,
+            Operation::Integers { matrix, .. } => matrix.padded_rows() - rows,
+            _ => 0,
+        }
+    }
 }
 
 /// Places the outputs of the layer that runs at `time`.
-fn step(network: &Network, layer: &Layer, time: usize, places: &mut Places) -> Step {
-    let operation = Operation::new(layer, network.planes[layer.inputs[0]], places);
-    let padding = match &operation {
-        Operation::Pointwise { matrix, .. } => matrix.padded_rows() - layer.outputs.len(),
-        _ => 0,
-    };
+fn step(network: &Network, layer: &Layer, time: usize, places: &mut Places, integers: bool) -> Step {
+    let operation = Operation::new(layer, network.planes[layer.inputs[0]], places, integers);
+    let padding = operation.padding(layer.outputs.len());
     let inputs = places.offsets(&layer.inputs);
     Step { operation, inputs, outputs: places.planes(&layer.outputs, padding, time) }
 }

@@ -64,7 +64,7 @@ impl YoloFastestV2 {
                 None => COCO_ANCHORS.map(Vec::from).into(),
             };
         }
-        let plan = Plan::new(name, graph::lower(name, &model)?, Level::new())?;
+        let plan = Plan::new(name, graph::lower(name, &model)?, Level::new(), config.integers)?;
         let (grids, classes) = Grid::find(name, &plan, &config.anchors)?;
         let class_names = class_names(&model, &config, classes).map_err(mismatch)?;
         // Room for a box of every anchor in every cell.

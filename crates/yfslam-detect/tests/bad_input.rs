@@ -119,6 +119,7 @@ fn a_model_that_does_not_fit_the_configuration_is_refused() {
         ("score_threshold = NaN", DetectorConfig { score_threshold: f32::NAN, ..config() }),
         ("iou_threshold = 0", DetectorConfig { iou_threshold: 0.0, ..config() }),
         ("anchors: [-1.0, 2.0]", DetectorConfig { anchors: vec![vec![[-1.0, 2.0]]], ..config() }),
+        ("it does not say how to compute with integers", DetectorConfig { integers: true, ..config() }),
         ("anchors for 1", DetectorConfig { anchors: vec![vec![[1.0, 2.0]]], ..config() }),
         (
             "with 1 anchors [4, 1, classes] is expected",
@@ -128,6 +129,16 @@ fn a_model_that_does_not_fit_the_configuration_is_refused() {
     for (expected, config) in cases {
         let words = load(config);
         assert!(words.contains(expected), "{words}");
+    }
+}
+
+#[test]
+fn scales_that_cannot_be_are_refused() {
+    for line in ["conv4 0.1", "conv4 0 128", "conv4 NaN 128", "conv4 0.1 256", "conv4 0.1 -1", "0.1 1"] {
+        let mut net = net();
+        net.metadata = vec![("scales", format!("conv1 0.1 0\n{line}"))];
+        let error = YoloFastestV2::from_bytes("test.onnx", &net.to_onnx(), &config()).unwrap_err().to_string();
+        assert!(error.contains(&format!("cannot read the scale \"{line}\"")), "{error}");
     }
 }
 

@@ -73,6 +73,39 @@ fn sizes_and_channels_that_fill_no_vector_are_computed_right() {
     }
 }
 
+/// On each line of the metadata the name of a 1×1 convolution, the step and the zero of what it reads.
+fn scales(net: &Net, image: &[f32]) -> String {
+    let line = |(name, low, high): (&str, f64, f64)| {
+        let step = (high - low) / 255.0;
+        format!("{name} {step} {}\n", (-low / step) as u8)
+    };
+    net.ranges(image).into_iter().map(line).collect()
+}
+
+#[test]
+fn integers_give_the_same_bits_at_every_level_and_nearly_what_floats_give() {
+    let size = Size { height: 96, width: 160, channels: 24, classes: 4 };
+    let (mut net, image) = (Net::yolo(&size, Style::Folded, 8), image(&size, 9));
+    net.metadata = vec![("scales", scales(&net, &image))];
+    let run = |integers: bool, level: Level| {
+        let config = DetectorConfig { integers, ..config(4) };
+        let detector = YoloFastestV2::from_bytes("synthetic", &net.to_onnx(), &config);
+        let mut detector = detector.expect("the synthetic network loads").with_level(level);
+        detector.forward(&image).expect("the image has the right size");
+        detector.raw_outputs().into_iter().flat_map(|output| output.values).collect::<Vec<f32>>()
+    };
+    // The layers in floats round in their own way where nothing is fused.
+    let fused = |level: &Level| ["Avx", "Neon"].iter().any(|name| format!("{level:?}").starts_with(name));
+    let mut outputs = available_levels().into_iter().filter(fused).map(|level| run(true, level));
+    let Some(first) = outputs.next() else { return };
+    assert!(outputs.all(|other| other == first));
+    let floats = run(false, Level::new());
+    let mean = |values: &mut dyn Iterator<Item = f32>| values.map(f64::from).sum::<f64>() / floats.len() as f64;
+    let error = mean(&mut floats.iter().zip(&first).map(|(a, b)| (a - b).powi(2)));
+    let power = mean(&mut floats.iter().map(|a| a.powi(2)));
+    assert!(error > 0.0 && error < 1e-2 * power, "{error} of {power}");
+}
+
 #[test]
 fn a_level_with_fused_multiply_add_gives_the_same_bits_as_any_other() {
     let size = Size { height: 96, width: 160, channels: 24, classes: 4 };

@@ -59,6 +59,9 @@ impl AnyYolo {
     pub fn from_bytes(name: &str, bytes: &[u8], config: &DetectorConfig) -> Result<Self, ModelError> {
         let mismatch = |what: String| ModelError::Mismatch { model: name.into(), what };
         check(config).map_err(mismatch)?;
+        if config.integers {
+            return Err(mismatch("integers are for YOLO-FastestV2 alone (`integers`); this is another network".into()));
+        }
         let model = Model::parse(bytes).map_err(|error| ModelError::NotOnnx { model: name.into(), what: error.0 })?;
         let (height, width) = input_size(&model).map_err(mismatch)?;
         let runtime =

@@ -46,8 +46,9 @@ impl<'m> Lowering<'m> {
         let size = (input.size.0.div_ceil(stride as usize), input.size.1.div_ceil(stride as usize));
         let outputs = self.network.new_planes(filters, size);
         let view = View::image(outputs.clone(), size);
-        let name = node.name.to_owned();
-        self.network.layers.push(Layer { name, kind, inputs, outputs, weights, bias, relu: false, addend: Vec::new() });
+        let (name, addend, scale) = (node.name.to_owned(), Vec::new(), self.scales.get(node.name).copied());
+        let layer = Layer { name, kind, inputs, outputs, weights, bias, relu: false, addend, scale };
+        self.network.layers.push(layer);
         Ok(view)
     }
 
@@ -138,6 +139,7 @@ impl<'m> Lowering<'m> {
             bias: Vec::new(),
             relu: false,
             addend: Vec::new(),
+            scale: None,
         });
         Ok(View::image(outputs, (height, width)))
     }

@@ -45,6 +45,7 @@ fn prepend(second: &mut Layer, first: &Layer) {
     }
     second.weights = weights;
     second.inputs.clone_from(&first.inputs);
+    second.scale = first.scale;
 }
 
 /// A 1×1 convolution commutes with nearest upsampling, so its part over upsampled planes runs at the small size:
@@ -89,7 +90,7 @@ fn split_off_upsampled(network: &mut Network, up: usize, reader: usize, start: u
     wide.weights = kept;
     wide.inputs.drain(start..start + count);
     wide.addend.clone_from(&large);
-    let name = wide.name.clone();
+    let (name, scale) = (wide.name.clone(), wide.scale);
 
     let mut upsample = network.layers.remove(up);
     let pointwise = Layer {
@@ -101,6 +102,7 @@ fn split_off_upsampled(network: &mut Network, up: usize, reader: usize, start: u
         bias: vec![0.0; rows],
         relu: false,
         addend: Vec::new(),
+        scale,
     };
     upsample.outputs = large;
     network.layers.splice(reader - 1..reader - 1, [pointwise, upsample]);

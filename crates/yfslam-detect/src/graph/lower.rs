@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::view::View;
 use super::{Kind, Network, fold};
 use crate::ModelError;
+use crate::kernels::integers::Scale;
 use crate::onnx::{FLOAT, Model, Node, Tensor, TensorData};
 
 /// Largest side of the network input and of any plane, px.
@@ -30,6 +31,8 @@ pub(super) struct Lowering<'m> {
     model: &'m Model<'m>,
     constants: BTreeMap<&'m str, Tensor>,
     views: BTreeMap<&'m str, View>,
+    /// How what each convolution reads may be stored in bytes, by the node's name.
+    pub(super) scales: BTreeMap<&'m str, Scale>,
     /// How often each value is read.
     pub(super) uses: BTreeMap<&'m str, usize>,
     /// The layer that each value comes from, for values that are a layer's whole result.
@@ -68,7 +71,9 @@ impl<'m> Lowering<'m> {
         network.input = network.new_planes(3, (height, width));
         let view = View::image(network.input.clone(), (height, width));
         let views = BTreeMap::from([(input.name, view)]);
-        Ok(Self { name, model, constants: BTreeMap::new(), views, uses, producers: BTreeMap::new(), network })
+        let scales = scales(model).map_err(mismatch)?;
+        let (constants, producers) = (BTreeMap::new(), BTreeMap::new());
+        Ok(Self { name, model, constants, views, scales, uses, producers, network })
     }
 
     fn finish(mut self) -> Result<Network, ModelError> {
@@ -194,6 +199,18 @@ impl<'m> Lowering<'m> {
         self.constants.extend(node.outputs.first().map(|output| (*output, tensor)));
         Ok(())
     }
+}
+
+/// Scales in a model's metadata: on each line the name of a convolution, the step and the zero of what it reads.
+fn scales<'m>(model: &Model<'m>) -> Step<BTreeMap<&'m str, Scale>> {
+    let scale = |line: &'m str| {
+        let mut words = line.rsplitn(3, ' ');
+        let zero = words.next()?.parse().ok()?;
+        let step = words.next()?.parse().ok().filter(|step: &f32| step.is_finite() && *step > 0.0)?;
+        Some((words.next()?, Scale { step, zero }))
+    };
+    let lines = model.metadata.get("scales").map_or("", |text| text.trim()).lines();
+    lines.map(|line| scale(line).ok_or_else(|| format!("cannot read the scale \"{line}\""))).collect()
 }
 
 impl Node<'_> {

@@ -11,6 +11,8 @@ mod view;
 
 pub(crate) use lower::lower;
 
+use crate::kernels::integers::Scale;
+
 /// Index into [`Network::planes`].
 pub(crate) type Plane = usize;
 
@@ -43,6 +45,8 @@ pub(crate) struct Layer {
     pub(crate) relu: bool,
     /// Planes added to the outputs before ReLU, one per output; mostly empty.
     pub(crate) addend: Vec<Plane>,
+    /// How the inputs may be stored in bytes, if the model file tells.
+    pub(crate) scale: Option<Scale>,
 }
 
 /// What a layer computes.

@@ -4,6 +4,7 @@
 //! inlined into it, or it is compiled for the wrong instruction set.
 
 pub(crate) mod depthwise;
+pub(crate) mod integers;
 pub(crate) mod matmul;
 pub(crate) mod stem;
 pub(crate) mod upsample;

@@ -13,6 +13,24 @@ struct Tensor {
 impl Net {
     /// The outputs for an input of `3 × height × width`.
     pub fn run(&self, image: &[f32]) -> Vec<Vec<f64>> {
+        let values = self.values(image);
+        self.outputs.iter().map(|(name, dims)| (&values[name], dims)).map(|(value, dims)| value.checked(dims)).collect()
+    }
+
+    /// For each 1×1 convolution its name, and the least and the largest value that it reads.
+    #[allow(dead_code, reason = "each test uses what it needs")]
+    pub fn ranges<'a>(&'a self, image: &[f32]) -> Vec<(&'a str, f64, f64)> {
+        let values = self.values(image);
+        let pointwise = |node: &&Node| node.op == "Conv" && values[&node.inputs[1]].dims[2..] == [1, 1];
+        let range = |node: &'a Node| {
+            let Node { name, inputs, .. } = node;
+            let data = &values[&inputs[0]].data;
+            (name.as_str(), data.iter().copied().fold(0.0, f64::min), data.iter().copied().fold(0.0, f64::max))
+        };
+        self.nodes.iter().filter(pointwise).map(range).collect()
+    }
+
+    fn values(&self, image: &[f32]) -> BTreeMap<String, Tensor> {
         let mut values = BTreeMap::new();
         let image = image.iter().map(|value| f64::from(*value)).collect();
         values.insert("image".to_owned(), Tensor { dims: vec![1, 3, self.height, self.width], data: image });
@@ -29,7 +47,7 @@ impl Net {
             let results = node.run(&inputs);
             values.extend(node.outputs.iter().cloned().zip(results));
         }
-        self.outputs.iter().map(|(name, dims)| (&values[name], dims)).map(|(value, dims)| value.checked(dims)).collect()
+        values
     }
 }
 
