@@ -1,4 +1,4 @@
-"""Six raw maps of one picture in, boxes out: the same formulas and the same suppression as the Rust runtime, in NumPy."""
+"""Six raw maps of one picture in, boxes out: the same formulas, suppression and fusion as the Rust runtime, in NumPy."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ def iou(box, boxes):
     return shared / (area(box) + area(boxes) - shared + 1e-9)
 
 
-def decode(outputs, anchors, wanted, least=0.3, suppress=0.4):
+def decode(outputs, anchors, wanted, least=0.3, suppress=0.5, fuse=0.7):
     """Boxes [n, 4] (corners, relative) of class number `wanted` and their scores, best first.
 
     outputs: reg, obj, cls at the fine, then at the coarse grid, each [1, channels, rows, columns]; anchors in px of the input.
@@ -44,11 +44,14 @@ def decode(outputs, anchors, wanted, least=0.3, suppress=0.4):
             low, high = (centre - half) / (columns * stride, rows * stride), (centre + half) / (columns * stride, rows * stride)
             found.append((score[anchor, y, x], *low, *high))
     found = np.array(sorted(found, reverse=True)).reshape(-1, 5)[:300]
-    kept = []
-    boxes = found[:, 1:]
+    kept, fused = [], []
+    scores, boxes = found[:, 0], found[:, 1:]
     alive = np.ones(len(found), bool)
     for index in range(len(found)):
         if alive[index]:
+            overlap = iou(boxes[index], boxes)
+            overlap[index] = 1  # a box without area agrees with itself, too
             kept.append(index)
-            alive &= iou(boxes[index], boxes) <= suppress
-    return np.clip(boxes[kept], 0, 1), found[kept, 0]
+            fused.append(np.average(boxes, axis=0, weights=scores * (overlap > fuse)))
+            alive &= overlap <= suppress
+    return np.clip(np.array(fused).reshape(-1, 4), 0, 1), scores[kept]

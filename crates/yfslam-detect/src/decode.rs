@@ -1,4 +1,4 @@
-//! Raw maps in, boxes out: anchors, sigmoid and softmax, then non-maximum suppression within each class.
+//! Raw maps in, boxes out: anchors, sigmoid and softmax, then non-maximum suppression and fusion within each class.
 //!
 //! With σ the sigmoid, cell (gx, gy), anchor (aw, ah) and stride s, all px of the network input:
 //! centre x = (2σ(tx) − ½ + gx) · s, width = (2σ(tw))² · aw, y and height alike; score = σ(objectness) · softmax(classes). The class
@@ -128,6 +128,23 @@ pub(crate) fn suppress(candidates: &mut [Detection], config: &DetectorConfig, ou
     }
 }
 
+/// Replaces each box of `kept` by the mean of the `candidates` that agree with it, weighed by their scores.
+pub(crate) fn fuse(candidates: &[Detection], config: &DetectorConfig, kept: &mut [Detection]) {
+    for found in kept {
+        let agrees = |other: &&Detection| other.class == found.class && other.bbox.iou(&found.bbox) > config.fuse_iou;
+        let (mut sums, mut weight) = ([0.0; 4], 0.0);
+        for Detection { score, bbox, .. } in candidates.iter().filter(agrees) {
+            let edges = [bbox.x_min, bbox.y_min, bbox.x_max, bbox.y_max];
+            sums.iter_mut().zip(edges).for_each(|(sum, edge)| *sum += score * edge);
+            weight += score;
+        }
+        if weight > 0.0 {
+            let [x_min, y_min, x_max, y_max] = sums.map(|sum| sum / weight);
+            found.bbox = BoundingBox { x_min, y_min, x_max, y_max };
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -142,6 +159,19 @@ mod tests {
         let mut out = Vec::new();
         suppress(&mut candidates, &DetectorConfig::default(), &mut out);
         assert_eq!(out, [found(0, 0.9, 0.0), found(1, 0.6, 0.0), found(0, 0.4, 8.0)]);
+    }
+
+    #[test]
+    fn boxes_that_agree_are_fused_by_their_scores() {
+        let candidates = [found(0, 0.6, 0.0), found(0, 0.3, 1.0), found(1, 0.9, 1.0), found(0, 0.3, 4.0)];
+        let mut kept = [found(0, 0.6, 0.0), found(1, 0.9, 1.0)];
+        fuse(&candidates, &DetectorConfig::default(), &mut kept);
+        assert!((kept[0].bbox.x_min - 1.0 / 3.0).abs() < 1e-6 && (kept[0].bbox.x_max - 31.0 / 3.0).abs() < 1e-5);
+        assert_eq!((kept[0].score, kept[1]), (0.6, found(1, 0.9, 1.0)));
+
+        let mut kept = [found(0, 0.6, 0.0)];
+        fuse(&candidates, &DetectorConfig { fuse_iou: 1.0, ..DetectorConfig::default() }, &mut kept);
+        assert_eq!(kept, [found(0, 0.6, 0.0)]);
     }
 
     #[test]

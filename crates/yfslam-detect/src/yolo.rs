@@ -7,7 +7,7 @@ use yfslam::image::RgbImage;
 use yfslam::{Detection, Detector, DetectorError};
 
 use crate::config::{COCO_ANCHORS, COCO_NAMES, DetectorConfig};
-use crate::decode::{Grid, suppress};
+use crate::decode::{Grid, fuse, suppress};
 use crate::onnx::Model;
 use crate::plan::Plan;
 use crate::preprocess::Stretch;
@@ -131,6 +131,7 @@ impl Detector for YoloFastestV2 {
             grid.candidates(&self.plan, self.config.score_threshold, &mut self.candidates);
         }
         suppress(&mut self.candidates, &self.config, out);
+        fuse(&self.candidates, &self.config, out);
         let [image_width, image_height] = [image_width, image_height].map(|side| side as f32);
         let scale = [image_width / width as f32, image_height / height as f32];
         for Detection { bbox, .. } in out.iter_mut() {
@@ -159,12 +160,15 @@ pub(crate) fn class_names(model: &Model, config: &DetectorConfig, classes: usize
 
 /// Refuses values with which no network can be run.
 pub(crate) fn check(config: &DetectorConfig) -> Result<(), String> {
-    let DetectorConfig { score_threshold, iou_threshold, anchors, .. } = config;
+    let DetectorConfig { score_threshold, iou_threshold, fuse_iou, anchors, .. } = config;
     if !(*score_threshold > 0.0 && *score_threshold < 1.0) {
         return Err(format!("score_threshold = {score_threshold} must lie between 0 and 1"));
     }
     if !(*iou_threshold > 0.0 && *iou_threshold <= 1.0) {
         return Err(format!("iou_threshold = {iou_threshold} must lie between 0 and 1"));
+    }
+    if !(*fuse_iou > 0.0 && *fuse_iou <= 1.0) {
+        return Err(format!("fuse_iou = {fuse_iou} must lie between 0 and 1"));
     }
     let wrong = |anchor: &&[f32; 2]| anchor.iter().any(|side| !(side.is_finite() && *side > 0.0));
     match anchors.iter().flatten().find(wrong) {

@@ -103,6 +103,8 @@ fn what_is_known_to_neither_runtime_is_refused_and_each_takes_its_own() {
     let mut strange = net("columns");
     strange.metadata.clear();
     assert!(words(&strange, &config).contains("3 classes without names"), "{}", words(&strange, &config));
+    let integers = DetectorConfig { integers: true, ..config.clone() };
+    assert!(words(&net("columns"), &integers).contains("integers are for YOLO-FastestV2 alone"));
     let named = DetectorConfig { class_names: vec!["a".into()], ..config };
     assert!(words(&net("columns"), &named).contains("3 classes, but 1 names"));
     let error = AnyYolo::from_bytes("test.onnx", b"hello", &DetectorConfig::default()).err().unwrap();

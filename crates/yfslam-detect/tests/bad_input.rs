@@ -118,6 +118,7 @@ fn a_model_that_does_not_fit_the_configuration_is_refused() {
         ("score_threshold = 1.5", DetectorConfig { score_threshold: 1.5, ..config() }),
         ("score_threshold = NaN", DetectorConfig { score_threshold: f32::NAN, ..config() }),
         ("iou_threshold = 0", DetectorConfig { iou_threshold: 0.0, ..config() }),
+        ("fuse_iou = NaN", DetectorConfig { fuse_iou: f32::NAN, ..config() }),
         ("anchors: [-1.0, 2.0]", DetectorConfig { anchors: vec![vec![[-1.0, 2.0]]], ..config() }),
         ("it does not say how to compute with integers", DetectorConfig { integers: true, ..config() }),
         ("anchors for 1", DetectorConfig { anchors: vec![vec![[1.0, 2.0]]], ..config() }),

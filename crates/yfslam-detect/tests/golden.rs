@@ -149,7 +149,8 @@ fn boxes_on_real_images_equal_those_of_onnx_runtime() {
     let Some(data) = data() else { return };
     let golden = golden();
     let (score_threshold, iou_threshold) = (golden.score_threshold, golden.iou_threshold);
-    let mut detector = detector(&data, &DetectorConfig { score_threshold, iou_threshold, ..DetectorConfig::default() });
+    let config = DetectorConfig { score_threshold, iou_threshold, fuse_iou: 1.0, ..DetectorConfig::default() };
+    let mut detector = detector(&data, &config);
     let mut found = Vec::new();
     for Boxes { file, pixel_sum, found: expected } in golden.boxes {
         let image = read_image(&data.join(&file));

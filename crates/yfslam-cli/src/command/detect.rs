@@ -53,7 +53,7 @@ pub struct DetectArgs {
     #[arg(long, value_name = "SCORE", default_value_t = 0.3, allow_negative_numbers = true, help_heading = "System")]
     score: f32,
     /// Of two boxes of one class that overlap by more than this (intersection over union), only the better one is kept.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.4, allow_negative_numbers = true, help_heading = "System")]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5, allow_negative_numbers = true, help_heading = "System")]
     iou: f32,
     /// Report these classes alone [default: all that the network knows].
     #[arg(long = "class", value_name = "NAME,NAME", value_delimiter = ',', help_heading = "System")]
