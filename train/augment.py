@@ -13,8 +13,8 @@ from . import clutter
 VISIBLE = 0.15  # of a cut person's box must remain for it to count; below, its place teaches nothing
 LEAST_SIDE = 9.0  # px
 CLOSE = 0.35  # of the pictures with people that are no mosaic show one of them close, mostly cut by the left or the right edge
-CLUTTER = 0.5  # of the pictures without people are strewn with drawn things, and half as many of those with people
-EMPTY = 0.45  # of the pictures lose everybody: a part is taken that shows nobody
+CLUTTER = 0.8  # of the pictures without people are strewn with drawn things, and half as many of those with people
+EMPTY = 0.5  # of the pictures lose everybody: a part is taken that shows nobody
 
 
 def angle(rng):
@@ -118,15 +118,16 @@ def erase(rng, image):
 
 
 def without_people(rng, image, boxes):
-    """A square part of a square picture that shows nobody, if one is found: what else stands about must be learnt too."""
+    """A square part of a square picture that shows nobody, or else the picture with everybody behind something: what else stands about
+    must be learnt too."""
     for _ in range(12):
-        share = rng.uniform(0.3, 0.8)
+        share = rng.uniform(0.25, 0.8)
         low = rng.uniform(0, 1 - share, 2)
         apart = (boxes[:, 3:5] <= low) | (boxes[:, 1:3] >= low + share)
         if apart.any(1).all():
             (x, y), side = (low * image.shape[0]).astype(int), int(share * image.shape[0])
             return image[y:y + side, x:x + side], boxes[:0]
-    return image, boxes
+    return clutter.cover(rng, image, boxes), boxes[:0]
 
 
 def sample(rng, draw, side, mosaic=0.35, strength=1.0):

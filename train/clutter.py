@@ -63,6 +63,14 @@ def hides(centre, size, boxes):
     return (np.maximum(high - low, 0).prod(1) > 0.2 * (boxes[:, 2:] - boxes[:, :2]).prod(1)).any()
 
 
+def cover(rng, image, boxes):
+    """A copy of the square picture with everybody in `boxes` (relative) behind something."""
+    image = np.ascontiguousarray(image).copy()
+    for low, high in boxes[:, 1:5].reshape(-1, 2, 2) * image.shape[0]:
+        (slab, sheet)[rng.integers(2)](rng, image, (low + high) / 2, (high - low) * rng.uniform(1.4, 1.8, 2))
+    return image
+
+
 def strew(rng, image, boxes):
     """A copy of the square picture with up to 16 things on it, the larger ones first, beside the people in `boxes` (relative). Pictures
     of people need them too, or drawn things would tell that nobody is there."""
