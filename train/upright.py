@@ -1,6 +1,6 @@
 """How well people are found when the camera is rolled: in pictures as they are, and set upright as the tracker has it done.
 
-    python -m train.upright CACHE --program target/release/yfslam [--detector MODEL]
+    python -m train.upright CACHE --program target/release/yfslam [--detector MODEL] [--integers]
 
 On the held-out pictures of CACHE, turned by 30, 60 and 90 degrees to either side; `yfslam detect --roll` is what is measured.
 """
@@ -19,9 +19,8 @@ from .evaluate import turned
 from .metrics import summary
 
 
-def found(program, detector, folder, roll):
+def found(program, own, folder, roll):
     """Boxes (corners, relative) and scores in each picture of the folder, in the order of their names."""
-    own = ["--detector", detector] if detector else []
     command = [program, "detect", folder, "--roll", str(roll), "--score", "0.01", "--out", folder / "out", "--quiet", *own]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     for image in json.loads((folder / "out/boxes.json").read_text())["images"]:
@@ -36,7 +35,9 @@ def main():
     parser.add_argument("cache", type=pathlib.Path)
     parser.add_argument("--program", type=pathlib.Path, required=True)
     parser.add_argument("--detector", type=pathlib.Path, help="instead of the program's own")
+    parser.add_argument("--integers", action="store_true", help="as `yfslam detect --integers` finds them")
     options = parser.parse_args()
+    own = ["--detector", options.detector] * bool(options.detector) + ["--integers"] * options.integers
     cache = Cache(options.cache, ["person"], held_out=True)
     for angle in (0, 30, 60, 90):
         as_is, upright, truths = [], [], []
@@ -47,8 +48,8 @@ def main():
                     picture, truth = turned(np.array(cache.images[index]), cache.boxes[index][:, 1:], degrees)
                     cv2.imwrite(str(folder / f"{number:06}.png"), picture)
                     truths.append(truth)
-                as_is += found(options.program, options.detector, folder, 0)
-                upright += found(options.program, options.detector, folder, degrees)
+                as_is += found(options.program, own, folder, 0)
+                upright += found(options.program, own, folder, degrees)
         for name, boxes in (("as it is", as_is), ("set upright", upright)):
             row = summary(boxes, truths)
             print(f"turned {angle:2}, {name:11}", " ".join(f"{k} {v:.3f}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))

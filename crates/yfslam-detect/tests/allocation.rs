@@ -44,7 +44,7 @@ fn image(width: usize, height: usize, pixel: impl Fn(usize) -> u8) -> RgbImage {
     RgbImage::from_vec(width, height, (0..width * height).map(|index| [pixel(index); 3]).collect()).unwrap()
 }
 
-/// Both networks in one test: the count is of all threads.
+/// All networks in one test: the count is of all threads.
 #[test]
 fn detecting_allocates_nothing_after_the_first_image_of_a_size_however_much_the_next_one_holds() {
     assert!(allocations(|| drop(vec![1_u8])) > 0, "the counter counts");
@@ -53,7 +53,10 @@ fn detecting_allocates_nothing_after_the_first_image_of_a_size_however_much_the_
     let random = YoloFastestV2::from_bytes("synthetic", &net.to_onnx(), &config).unwrap();
     let low = DetectorConfig { score_threshold: 0.005, ..DetectorConfig::default() };
     let embedded = YoloFastestV2::embedded(&low).unwrap();
-    for (mut detector, width, height, blank) in [(random, 30, 20, 0), (embedded, 640, 480, 128)] {
+    let integers = YoloFastestV2::embedded(&DetectorConfig { integers: true, ..low }).unwrap();
+    for (mut detector, width, height, blank) in
+        [(random, 30, 20, 0), (embedded, 640, 480, 128), (integers, 640, 480, 128)]
+    {
         // Something upright before a grained wall.
         let figure = |index: usize| {
             let (x, y) = (index % width * 100 / width, index / width * 100 / height);
