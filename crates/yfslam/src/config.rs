@@ -231,6 +231,9 @@ config_section! {
         max_misses: usize = 30,
         /// Overlap (IoU) with the box of somebody who is carried from which on a new box that holds only the wall behind him is his.
         same_box_iou: f32 = 0.7,
+        /// Weight of features that boxes speak against in a frame that would be lost without them: if that holds them to be somebody, and the map
+        /// knows them, the map is right.
+        doubted_trust: f32 = 0.5,
         /// How far a body that is carried can be from its last depth before it is somebody else, m.
         max_jump_m: f32 = 0.2,
         /// Share of its former size at which a body that is carried is seen whole, and its box follows it.

@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use yfslam::camera::Camera;
-use yfslam::config::DepthSource;
+use yfslam::config::{DepthSource, FullConfig};
 use yfslam::dynamic::Method;
 use yfslam::image::{DepthImage, Image, RgbImage};
 use yfslam::system::{FrameRejected, SetupError};
-use yfslam::{Config, RgbdFrame, Slam};
+use yfslam::{BoundingBox, Config, Detection, RgbdFrame, Slam};
 
 /// A grained picture of a wall, with a mask of the given width.
 fn frame(timestamp_ns: i64, mask_width: usize) -> RgbdFrame {
@@ -145,5 +145,40 @@ fn full_forgets_what_is_gone_after_half_a_second_and_nothing_that_stands() {
         assert!(things > 30 && all > things + 200, "{things} {all}");
         let (left, others) = (5..25).map(|i| see(i, false)).last().unwrap();
         assert!((left == 0) == forgets && others >= all - things, "{method:?}: {left} {others}");
+    }
+}
+
+/// A wall beside a screen that shows something else in each frame.
+fn beside_screen(i: i64, is_person: bool) -> RgbdFrame {
+    let mut frame = frame(i * 33_000_000, 640);
+    let (mut color, mut depth) = (frame.color.as_ref().clone(), frame.depth.as_ref().clone());
+    for y in 0..480 {
+        let other = (i as usize * 37 + y * 5) % 480;
+        let shown: Vec<[u8; 3]> = frame.color.row(other)[..160].iter().rev().copied().collect();
+        color.row_mut(y)[480..].copy_from_slice(&shown);
+        depth.raw.row_mut(y)[480..].fill(15_000);
+    }
+    let bbox = BoundingBox { x_min: 0.0, y_min: 0.0, x_max: 480.0, y_max: 480.0 };
+    let wall = is_person.then_some(Detection { class: 0, score: 0.9, bbox });
+    frame.detections = Some(wall.into_iter().collect());
+    (frame.color, frame.depth, frame.mask) = (Arc::new(color), Arc::new(depth), None);
+    frame
+}
+
+#[test]
+fn full_does_not_lose_the_camera_when_all_that_stands_is_taken_for_a_person() {
+    for (doubted_trust, is_lost) in [(0.0, true), (FullConfig::default().doubted_trust, false)] {
+        let mut config = Config::default();
+        config.dynamic.method = Method::Full;
+        config.dynamic.full.doubted_trust = doubted_trust;
+        let mut slam = Slam::new(config, &camera(), None).unwrap();
+        let poses: Vec<_> = (0..10).map(|i| slam.track(&beside_screen(i, i >= 5)).unwrap().t_world_cam).collect();
+        assert!(poses[..5].iter().all(Option::is_some));
+        assert_eq!(poses[5..].iter().any(Option::is_none), is_lost, "{doubted_trust}: {poses:?}");
+        let off_m = poses.iter().flatten().map(|pose| pose.translation.vector.norm()).fold(0.0, f64::max);
+        assert!(off_m < 0.02, "{doubted_trust}: {off_m}");
+        // What is taken for a person and found on the map is no landmark that is new.
+        let features = &slam.last_frame().features.features;
+        assert!(is_lost || features.iter().filter(|f| f.trust == doubted_trust).count() > 50);
     }
 }

@@ -149,6 +149,16 @@ impl DynamicFilter for Full {
         found
     }
 
+    fn doubt_boxes(&mut self, config: &DynamicConfig, features: &mut FrameFeatures) -> bool {
+        (0..self.tracks.list.len()).for_each(|track| self.outlines.bodies.release(track));
+        let mut any = false;
+        for f in features.features.iter_mut().filter(|f| f.trust == 0.0 && !self.outlines.bodies.covers(f.raw, 0.0)) {
+            f.trust = config.full.doubted_trust;
+            any = true;
+        }
+        any
+    }
+
     fn end_frame(&mut self, config: &DynamicConfig, timestamp_ns: i64, tie: Tie) {
         if self.views.is_due(&config.full, timestamp_ns) {
             self.sample();

@@ -111,6 +111,12 @@ pub trait DynamicFilter: Send + Sync {
         false
     }
 
+    /// Withdraws what boxes speak against, since the map cannot be followed without it: such features get the trust
+    /// [`FullConfig::doubted_trust`](crate::config::FullConfig::doubted_trust). Returns whether there are any.
+    fn doubt_boxes(&mut self, _config: &DynamicConfig, _features: &mut FrameFeatures) -> bool {
+        false
+    }
+
     /// Takes note of the pose of the frame.
     fn end_frame(&mut self, _config: &DynamicConfig, _timestamp_ns: i64, _tie: Tie) {}
 

@@ -241,14 +241,9 @@ impl Slam {
             }
             TrackingState::NotInitialized => self.owner.is_free() && self.has_enough_to_start(),
             TrackingState::Tracking => {
-                let min_inliers = self.config.tracking.local_min_inliers;
-                let map = self.owner.map();
-                let estimated = self.tracker.estimate(&self.sensor, &self.config, map);
-                if estimated {
-                    sharpen(self.filter.as_mut(), &mut self.tracker.current, &self.sensor, &self.config, map);
-                }
-                let tracked = estimated && self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers);
+                let tracked = self.follow(self.config.tracking.local_min_inliers) || self.follow_despite_boxes();
                 if tracked && self.config.dynamic.method == Method::Full && !self.is_map_frozen() {
+                    let map = self.owner.map();
                     self.tracker.look_through(&self.sensor, &self.config.dynamic.full, map, &depth);
                 }
                 tracked
@@ -408,6 +403,27 @@ impl Slam {
         let factor = (last.len() as f64 / trusted as f64).clamp(1.0, self.config.dynamic.max_extra_features);
         let begins = !self.sensor.measures_depth && self.is_young();
         (count * factor * if begins { self.config.monocular.start_features } else { 1.0 }) as usize
+    }
+
+    /// Tracks a frame whose neighbour was tracked: at least `min_inliers` landmarks must fit.
+    fn follow(&mut self, min_inliers: usize) -> bool {
+        let map = self.owner.map();
+        if !self.tracker.estimate(&self.sensor, &self.config, map) {
+            return false;
+        }
+        sharpen(self.filter.as_mut(), &mut self.tracker.current, &self.sensor, &self.config, map);
+        self.tracker.track_local_map(&self.sensor, &self.config, map, min_inliers)
+    }
+
+    /// Tracks such a frame by what boxes speak against too: a false one that fills the picture must not take the ground from under
+    /// tracking. Whoever really is there is on no map.
+    fn follow_despite_boxes(&mut self) -> bool {
+        // As sure as whoever was lost has to be.
+        let min_inliers = self.config.places.relocalise_min_inliers;
+        let tracked = self.filter.doubt_boxes(&self.config.dynamic, &mut self.tracker.current.features)
+            && self.follow(min_inliers);
+        self.tracker.current.settle_doubts();
+        tracked
     }
 
     /// Seeks the frame of a camera that was lost in the whole map, and tracks it there.

@@ -67,6 +67,15 @@ impl TrackedFrame {
         }
     }
 
+    /// Distrusts the features that boxes speak against and that are no landmarks either.
+    pub fn settle_doubts(&mut self) {
+        for (sight, feature) in self.sights.iter().zip(&mut self.features.features) {
+            if feature.trust < 1.0 && sight.is_none() {
+                feature.trust = 0.0;
+            }
+        }
+    }
+
     /// Number of matched features.
     pub fn matched(&self) -> usize {
         self.sights.iter().flatten().count()

@@ -147,10 +147,13 @@ impl Tracker {
         }
         self.visible.sort_unstable();
         self.visible.dedup();
-        self.sightings.visible.extend_from_slice(&self.visible);
         self.inliers = self.current.refine_pose(sensor, &config.pose);
+        if self.inliers < min_inliers {
+            return false; // The pose is not known, nor what should have been seen from there.
+        }
+        self.sightings.visible.extend_from_slice(&self.visible);
         self.sightings.found.extend(self.current.sights.iter().flatten().filter_map(|sight| sight.landmark));
-        self.inliers >= min_inliers
+        true
     }
 
     /// Notes landmarks that the frame, once tracked, sees through.
