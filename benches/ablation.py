@@ -23,6 +23,7 @@ PARTS = {
     "bodies end at gaps in depth": "max_gap_cells = 0",
     "corners on outlines are kept": "edge_px = 0.0",
     "landmarks that are seen through stay": "through_m = 100.0",
+    "boxes are never doubted": "doubted_trust = 0.0",
     "nothing returns when features run short": "-",
 }
 

@@ -14,6 +14,7 @@ VISIBLE = 0.15  # of a cut person's box must remain for it to count; below, its 
 LEAST_SIDE = 9.0  # px
 CLOSE = 0.35  # of the pictures with people that are no mosaic show one of them close, mostly cut by the left or the right edge
 CLUTTER = 0.8  # of the pictures without people are strewn with drawn things, and half as many of those with people
+DESK = 0.3  # of the pictures without people have a drawn desk in the foreground
 EMPTY = 0.5  # of the pictures lose everybody: a part is taken that shows nobody
 
 
@@ -144,6 +145,8 @@ def sample(rng, draw, side, mosaic=0.35, strength=1.0):
         image, boxes = draw(rng)
         if rng.random() < EMPTY:
             image, boxes = without_people(rng, image, boxes)
+            if rng.random() < strength * DESK:
+                image = clutter.desk(rng, image)
         if rng.random() < strength * CLUTTER * (0.5 if len(boxes) else 1):
             image = clutter.strew(rng, image, boxes)
         single = len(spans) == 1

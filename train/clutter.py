@@ -1,4 +1,4 @@
-"""Things that are nobody, drawn over pictures: dark and light slabs, sheets with lines, jars of pens, blobs.
+"""Things that are nobody, drawn over pictures: dark and light slabs, sheets with lines, jars of pens, blobs, and desks with screens.
 
 Photos of people hold few desks, screens and shelves; a network that has seen little of them takes what stands upright and is
 coloured, or large and dark, for somebody. The shapes are simple on purpose: none of them looks like a person.
@@ -55,6 +55,33 @@ def blob(rng, image, centre, size):
     for share in (1.0, rng.uniform(0.4, 0.9)):
         axes = np.maximum(size * share / 2, 1).astype(int).tolist()
         cv2.ellipse(image, np.rint(centre).astype(int).tolist(), axes, angle, 0, 360, paint(rng), -1, cv2.LINE_AA)
+
+
+def screen(rng, image, centre, size):
+    """A dark or shining slab in a rim on a foot, at times with windows on it."""
+    foot = centre + (0, 0.62 * size[1])
+    blob(rng, image, foot, size * (rng.uniform(0.2, 0.5), 0.25))
+    edge = size * rng.uniform(1.02, 1.15)
+    slab(rng, image, centre, edge)
+    corners = np.rint(centre + np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * size / 2).astype(np.int32)
+    cv2.fillConvexPoly(image, corners, paint(rng) if rng.random() < 0.4 else (float(rng.uniform(0, 50)),) * 3, cv2.LINE_AA)
+    for _ in range(rng.integers(0, 4) if rng.random() < 0.4 else 0):
+        sheet(rng, image, centre + rng.uniform(-0.25, 0.25, 2) * size, size * rng.uniform(0.2, 0.5, 2))
+
+
+def desk(rng, image):
+    """A copy of a picture of nobody with a desk before it that fills much of it: what a robot sees of an office from near."""
+    image, side = np.ascontiguousarray(image).copy(), image.shape[0]
+    top = rng.uniform(-0.2, 0.7) * side
+    slab(rng, image, np.array([0.5 * side, 0.5 * (top + 1.3 * side)]), np.array([1.8 * side, 1.3 * side - top]))
+    for x in np.sort(rng.uniform(-0.1, 1.1, rng.integers(0, 4))):
+        size = side * rng.uniform(0.25, 0.9) * np.array([1, rng.uniform(0.55, 0.85)])
+        screen(rng, image, np.array([x * side, top + rng.uniform(-0.4, 0.6) * size[1]]), size)
+    for _ in range(rng.integers(0, 4)):
+        size = side * rng.uniform(0.1, 0.6) * np.array([1, rng.uniform(0.25, 0.8)])
+        sheet(rng, image, np.array([rng.uniform(0, side), rng.uniform(max(top, 0), 1.1 * side)]), size)
+    light = cv2.resize(np.exp(rng.normal(0, 0.2, (5, 5))).astype(np.float32), (side, side), interpolation=cv2.INTER_CUBIC)
+    return cv2.multiply(image, cv2.merge([light] * 3), dtype=cv2.CV_8U)
 
 
 def hides(centre, size, boxes):

@@ -70,7 +70,7 @@ def turned(image, boxes, degrees):
     return picture, cut[area(cut) > 0.5 * area(whole)]
 
 
-def held_out(network, cache, degrees=()):
+def held_out(network, cache, degrees=(), score=0.3):
     """Metrics over the held-out pictures, each turned by all of `degrees`."""
     found, truths = [], []
     for index in cache.chosen:
@@ -79,7 +79,7 @@ def held_out(network, cache, degrees=()):
             picture, truth = turned(image, boxes, angle) if angle else (image, boxes)
             found.append(network(picture))
             truths.append(truth)
-    return summary(found, truths)
+    return summary(found, truths, score)
 
 
 def crowd(network, data, score=0.3):
@@ -124,10 +124,9 @@ def nobody(network, folder, score=0.3):
     for recording in sorted(path for path in folder.iterdir() if (path / "rgb").is_dir()):
         files = sorted((recording / "rgb").iterdir())
         per_frame.append([int((network(cv2.imread(str(file)))[1] > score).sum()) for file in files])
-        print(f"    {recording.name:36} {np.mean(per_frame[-1]):.3f}")
-    frames = np.concatenate(per_frame)
+    frames, means = np.concatenate(per_frame), [np.mean(counts) for counts in per_frame]
     return {"recordings": len(per_frame), "frames": len(frames), "false_per_frame": float(frames.mean()),
-            "frames_with_any": float((frames > 0).mean()), "worst_recording": float(max(map(np.mean, per_frame)))}
+            "frames_with_any": float((frames > 0).mean()), "worst_recording": float(max(means))}
 
 
 def report(network, cache, data, empty):
