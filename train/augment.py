@@ -10,9 +10,9 @@ import numpy as np
 
 from . import clutter
 
-VISIBLE = 0.15  # of a cut person's box must remain for it to count; below, its place teaches nothing
+VISIBLE = 0.1  # of a cut person's box must remain for it to count; below, its place teaches nothing
 LEAST_SIDE = 9.0  # px
-CLOSE = 0.35  # of the pictures with people that are no mosaic show one of them close, mostly cut by the left or the right edge
+CLOSE = 0.5  # of the pictures with people that are no mosaic show one of them close, mostly cut by the left or the right edge
 CLUTTER = 0.8  # of the pictures without people are strewn with drawn things, and half as many of those with people
 DESK = 0.3  # of the pictures without people have a drawn desk in the foreground
 EMPTY = 0.5  # of the pictures lose everybody: a part is taken that shows nobody
@@ -38,7 +38,7 @@ def matrix(rng, boxes, source, width, height, zoom, theta, cut=False):
     anchor = rng.uniform(0, source, 2)
     if len(boxes) and (cut or rng.random() < 0.7):
         x0, y0, x1, y1 = boxes[rng.integers(len(boxes)), 1:5] * source
-        margin = 0.2 if cut else 0.0  # less than a fifth of a person may show nothing of him
+        margin = 0.12 if cut else 0.0  # less than an eighth of a person may show nothing of him
         anchor = np.array([x0, y0]) + rng.uniform(margin, 1 - margin, 2) * (x1 - x0, y1 - y0)
     size = np.array([width, height], float)
     goal = rng.uniform(0, 1, 2) * size
@@ -156,7 +156,7 @@ def sample(rng, draw, side, mosaic=0.35, strength=1.0):
         if single and len(boxes) and rng.random() < strength * CLOSE:
             height = rng.choice(boxes[:, 4] - boxes[:, 2])
             zoom = np.clip(np.exp(rng.uniform(np.log(0.7), np.log(2.0))) / height, 0.65, 3.0)
-            cut = rng.random() < 0.7
+            cut = rng.random() < 0.8
         affine = matrix(rng, boxes, image.shape[0], x1 - x0, y1 - y0, zoom, strength * angle(rng), cut)
         canvas[y0:y1, x0:x1] = cv2.warpAffine(image, affine, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR, borderValue=border)
         affine[:, 2] += (x0, y0)

@@ -234,6 +234,8 @@ config_section! {
         /// Weight of features that boxes speak against in a frame that would be lost without them: if that holds them to be somebody, and the map
         /// knows them, the map is right.
         doubted_trust: f32 = 0.5,
+        /// Landmarks seen on a body in such a frame from which on its box is false, and ignored as long as it is there.
+        refuting_landmarks: usize = 30,
         /// How far a body that is carried can be from its last depth before it is somebody else, m.
         max_jump_m: f32 = 0.2,
         /// Share of its former size at which a body that is carried is seen whole, and its box follows it.

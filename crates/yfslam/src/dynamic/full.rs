@@ -20,6 +20,8 @@ pub struct Full {
     tracks: Tracks,
     groups: DepthGroups,
     outlines: Outlines,
+    /// The bodies of a frame in which boxes are doubted.
+    doubted: BodyMask,
     /// What must stay out of maps: bodies count here even if features on them are trusted, since they stand still or nothing else is left.
     unmapped: BodyMask,
     regions: Vec<Region>,
@@ -116,7 +118,7 @@ impl DynamicFilter for Full {
         self.outlines.outline(config, &mut self.groups, &mut self.tracks, 0.0);
         self.unmapped.copy(&self.outlines.bodies);
         self.regions.clear();
-        let alive = self.tracks.list.iter().filter(|track| !track.ended);
+        let alive = self.tracks.list.iter().filter(|track| track.is_body());
         self.regions.extend(alive.map(|track| track.region(config)));
         self.distrust(config, evidence, features);
     }
@@ -150,6 +152,7 @@ impl DynamicFilter for Full {
     }
 
     fn doubt_boxes(&mut self, config: &DynamicConfig, features: &mut FrameFeatures) -> bool {
+        self.doubted.copy(&self.outlines.bodies);
         (0..self.tracks.list.len()).for_each(|track| self.outlines.bodies.release(track));
         let mut any = false;
         for f in features.features.iter_mut().filter(|f| f.trust == 0.0 && !self.outlines.bodies.covers(f.raw, 0.0)) {
@@ -157,6 +160,21 @@ impl DynamicFilter for Full {
             any = true;
         }
         any
+    }
+
+    /// Boxes of bodies on which there are many landmarks are false.
+    fn settle_doubts(&mut self, config: &DynamicConfig, features: &FrameFeatures) {
+        self.verdicts.clear();
+        self.verdicts.resize(self.tracks.list.len(), [0; 2]);
+        let found = features.features.iter().filter(|f| f.trust > 0.0 && f.trust < 1.0);
+        for track in found.filter_map(|f| self.doubted.body_at(f.raw)) {
+            if let Some([known, _]) = self.verdicts.get_mut(track) {
+                *known += 1;
+            }
+        }
+        for (track, [known, _]) in self.tracks.list.iter_mut().zip(&self.verdicts) {
+            track.refuted |= *known as usize >= config.full.refuting_landmarks;
+        }
     }
 
     fn end_frame(&mut self, config: &DynamicConfig, timestamp_ns: i64, tie: Tie) {

@@ -117,6 +117,9 @@ pub trait DynamicFilter: Send + Sync {
         false
     }
 
+    /// Ends the doubts of a frame that was tracked: of what boxes speak against, the features that are landmarks have kept some trust.
+    fn settle_doubts(&mut self, _config: &DynamicConfig, _features: &FrameFeatures) {}
+
     /// Takes note of the pose of the frame.
     fn end_frame(&mut self, _config: &DynamicConfig, _timestamp_ns: i64, _tie: Tie) {}
 

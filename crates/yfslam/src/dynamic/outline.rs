@@ -33,7 +33,7 @@ impl Outlines {
     pub fn outline(&mut self, config: &DynamicConfig, groups: &mut DepthGroups, tracks: &mut Tracks, min_score: f32) {
         self.waiting.clear();
         self.waiting
-            .extend((0..tracks.list.len()).filter(|&t| !tracks.list[t].ended && tracks.list[t].score >= min_score));
+            .extend((0..tracks.list.len()).filter(|&t| tracks.list[t].is_body() && tracks.list[t].score >= min_score));
         self.outlined.clear();
         self.adopt(config, tracks);
         while let Some((t, center_m)) = self.nearest(config, groups, tracks) {

@@ -23,6 +23,8 @@ pub struct Track {
     pub depth_age: usize,
     /// Whether it was found to show nothing; the next update drops it.
     pub ended: bool,
+    /// Whether the map knows what its box holds. That lasts while much the same box is detected.
+    pub refuted: bool,
     /// Frames since its last detection in which a detector looked.
     missed_looks: usize,
     /// Motion of the box's centre, px per frame.
@@ -75,10 +77,11 @@ impl Tracks {
         self.track_taken.resize(self.list.len(), false);
         self.detection_taken.clear();
         self.detection_taken.resize(detections.len(), false);
-        for &(_, t, d) in &self.pairs {
+        for &(iou, t, d) in &self.pairs {
             if !self.track_taken[t] && !self.detection_taken[d] {
                 self.track_taken[t] = true;
                 self.detection_taken[d] = true;
+                self.list[t].refuted &= iou >= config.full.same_box_iou;
                 self.list[t].follow(&detections[d]);
             }
         }
@@ -95,10 +98,11 @@ impl Tracks {
                     velocity: [0.0; 2],
                     body: Extent::default(),
                     hidden: false,
+                    refuted: false,
                 });
             }
         }
-        self.list.retain(|track| track.missed_looks <= max_misses);
+        self.list.retain(|track| track.missed_looks <= if track.refuted { 0 } else { max_misses });
     }
 
     /// Gives the box of a new track, whose body would be `center_m` away, to one that was carried and whose body stands before that, if there
@@ -132,6 +136,11 @@ impl Tracks {
 }
 
 impl Track {
+    /// Whether it is to be outlined.
+    pub fn is_body(&self) -> bool {
+        !self.ended && !self.refuted
+    }
+
     /// Its box, with the depths of the body.
     pub fn region(&self, config: &DynamicConfig) -> Region {
         let depth_m = self.depth_m.map(|z| [z - config.group_half_width_m, z + config.group_half_width_m]);

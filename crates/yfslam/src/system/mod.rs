@@ -423,6 +423,9 @@ impl Slam {
         let tracked = self.filter.doubt_boxes(&self.config.dynamic, &mut self.tracker.current.features)
             && self.follow(min_inliers);
         self.tracker.current.settle_doubts();
+        if tracked {
+            self.filter.settle_doubts(&self.config.dynamic, &self.tracker.current.features);
+        }
         tracked
     }
 
