@@ -251,6 +251,22 @@ mod tests {
         assert_eq!((tracks.list.len(), tracks.list[0].misses), (1, 0));
     }
 
+    #[test]
+    fn a_refuted_box_is_ignored_while_it_stays() {
+        let config = DynamicConfig::default();
+        let mut tracks = Tracks::default();
+        let mut refuted = |next: &[Detection]| {
+            tracks.list.clear();
+            tracks.update(&config, 10, &[detection(50.0, 0.8)], &[None], [640, 480]);
+            tracks.list[0].refuted = true;
+            tracks.update(&config, 10, next, &vec![None; next.len()], [640, 480]);
+            tracks.list.iter().map(Track::is_body).collect::<Vec<_>>()
+        };
+        assert_eq!(refuted(&[detection(55.0, 0.8)]), [false]);
+        assert_eq!(refuted(&[detection(90.0, 0.8)]), [true], "somebody else");
+        assert_eq!(refuted(&[]), [false; 0], "it is not carried");
+    }
+
     /// The tracks after ten frames in which somebody 2 m away walked by 8 px a frame, his body outlined.
     fn walker(config: &DynamicConfig) -> Tracks {
         let mut tracks = Tracks::default();
