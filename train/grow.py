@@ -31,7 +31,7 @@ def read(path):
         model, config = load(path)
         return fold(model).state_dict(), config
     model = onnx.load(path)
-    about = {entry.key: json.loads(entry.value) for entry in model.metadata_props}
+    about = {entry.key: json.loads(entry.value) for entry in model.metadata_props if entry.key in ("names", "anchors")}
     if not {"names", "anchors"} <= about.keys():
         raise SystemExit(f"{path} was not written by train.export: it does not tell its classes and anchors")
     arrays = {t.name.removesuffix("_half"): onnx.numpy_helper.to_array(t).astype(np.float32) for t in model.graph.initializer}
