@@ -43,7 +43,7 @@ def main():
     for score in options.scores:
         photos, bonn = held_out(network, cache, score=score), crowd(network, options.data, score)
         desk = false_alarms(network, options.data, score)["false_per_frame"]
-        row = f"{score:5.2f}  {photos['tall_recall']:.3f}      {photos['precision']:.3f}      {bonn['all_at_iou_.5']:.3f}        {bonn['false_per_empty_frame']:.3f} {desk:.3f}"
+        row = f"{score:5.3f}  {photos['tall_recall']:.3f}      {photos['precision']:.3f}      {bonn['all_at_iou_.5']:.3f}        {bonn['false_per_empty_frame']:.3f} {desk:.3f}"
         if options.empty:
             row += f"   {nobody(network, options.empty, score)['false_per_frame']:.3f}"
         print(row, flush=True)

@@ -118,8 +118,8 @@ impl Config {
             (
                 "dynamic.full.doubted_trust",
                 self.dynamic.full.doubted_trust.to_string(),
-                share(self.dynamic.full.doubted_trust.into()),
-                "from 0 to 1",
+                share(self.dynamic.full.doubted_trust.into()) && self.dynamic.full.doubted_trust < 1.0,
+                "from 0 to less than 1",
             ),
             (
                 "dynamic.full.same_box_iou",
