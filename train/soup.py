@@ -2,8 +2,8 @@
 
     python -m train.soup OUT.pt A.pt B.pt...
 
-It computes what one of them does, in the same time, and is surer than each: with as many people found there are fewer false alarms. OUT
-can be exported, evaluated, and trained on.
+It takes the time of one of them. The embedded network is such a mean: with as many people found it has fewer false alarms than each half
+(`train.scores`). OUT can be exported, evaluated, and trained on.
 """
 
 import argparse

@@ -18,7 +18,7 @@ pub struct DetectorConfig {
     /// (stride 32). Empty: those that the model file names, else those of the official COCO model.
     pub anchors: Vec<Vec<[f32; 2]>>,
     /// Whether 1×1 convolutions are computed with integers of 8 bits, in models that say how (`python -m train.quantize`): a little less
-    /// accurate; faster where the processor has AVX-512 VNNI, ten times slower elsewhere.
+    /// accurate; faster where the processor has AVX-512 VNNI, many times slower elsewhere.
     pub integers: bool,
     /// Names of the classes. Empty: those that the model file names, else, for 80 classes, those of COCO.
     pub class_names: Vec<String>,
