@@ -6,9 +6,10 @@ use std::hint::black_box;
 use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use yfslam::RgbImage;
 use yfslam::config::FeatureConfig;
-use yfslam::features::{Features, OrbExtractor};
-use yfslam::image::{GrayImage, RgbImage, gray_from_rgb};
+use yfslam::unstable::{Features, OrbExtractor};
+use yfslam::unstable::{GrayImage, gray_from_rgb};
 
 #[path = "../examples/pgm/mod.rs"]
 mod pgm;

@@ -8,7 +8,7 @@ mod pgm;
 use std::io::{BufWriter, Error, ErrorKind, Result, Write};
 
 use yfslam::config::FeatureConfig;
-use yfslam::features::{Features, OrbExtractor};
+use yfslam::unstable::{Features, OrbExtractor};
 
 fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);

@@ -17,8 +17,8 @@ use fearless_simd::{Level, Simd, dispatch};
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
 use yfslam::config::FeatureConfig;
-use yfslam::features::{Features, KeyPoint, OrbExtractor};
-use yfslam::image::GrayImage;
+use yfslam::unstable::GrayImage;
+use yfslam::unstable::{Features, KeyPoint, OrbExtractor};
 
 /// Test pairs wanted.
 const PAIRS: usize = 256;

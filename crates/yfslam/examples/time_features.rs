@@ -9,7 +9,7 @@ use std::io::{Error, ErrorKind, Result, Write};
 use std::time::Instant;
 
 use yfslam::config::FeatureConfig;
-use yfslam::features::{Features, OrbExtractor};
+use yfslam::unstable::{Features, OrbExtractor};
 
 fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);

@@ -1,10 +1,13 @@
 //! Pinhole camera with radial-tangential (Brown–Conrady) distortion, as OpenCV defines it.
 
-use serde::{Deserialize, Serialize};
+/// Frames per second of a camera that states none.
+const DEFAULT_FPS: f64 = 30.0;
+/// Baseline times focal length of an RGB-D camera that states none, px·m. Source: ORB-SLAM2 settings for TUM.
+const DEFAULT_BF: f64 = 40.0;
 
-/// Intrinsic calibration of an RGB-D camera whose depth is registered to its colour image.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// Intrinsic calibration of a camera: of the colour image, to which depth is registered, or of the left image of a rectified pair.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Camera {
     /// Image width, px.
     pub width: usize,
@@ -19,27 +22,40 @@ pub struct Camera {
     /// Principal point in y, px.
     pub cy: f64,
     /// Distortion coefficients k1, k2, p1, p2, k3 (OpenCV order), all zero for rectified images.
-    #[serde(default)]
     pub distortion: [f64; 5],
-    /// Sensor units of depth per metre, such as 5000 for TUM recordings and 1000 for millimetres.
-    pub depth_factor: f64,
     /// Nominal frames per second.
-    #[serde(default = "default_fps")]
     pub fps: f64,
-    /// Baseline of the depth sensor times `fx`, px·m; scales the virtual right coordinate u_R = u − bf/z.
-    #[serde(default = "default_bf")]
+    /// Baseline times `fx`, px·m: of the stereo pair; of an RGB-D camera it scales the virtual disparity `bf / z` alone.
     pub bf: f64,
 }
 
-fn default_fps() -> f64 {
-    30.0
-}
-
-fn default_bf() -> f64 {
-    40.0
-}
-
 impl Camera {
+    /// Makes a camera without distortion, at 30 frames per second; all but the size (px) in px.
+    pub fn pinhole(width: usize, height: usize, fx: f64, fy: f64, cx: f64, cy: f64) -> Self {
+        Self { width, height, fx, fy, cx, cy, distortion: [0.0; 5], fps: DEFAULT_FPS, bf: DEFAULT_BF }
+    }
+
+    /// Sets the distortion coefficients k1, k2, p1, p2, k3 (OpenCV order).
+    #[must_use]
+    pub fn with_distortion(mut self, distortion: [f64; 5]) -> Self {
+        self.distortion = distortion;
+        self
+    }
+
+    /// Sets the nominal frames per second.
+    #[must_use]
+    pub fn with_fps(mut self, fps: f64) -> Self {
+        self.fps = fps;
+        self
+    }
+
+    /// Sets the baseline times `fx`, px·m.
+    #[must_use]
+    pub fn with_bf(mut self, bf: f64) -> Self {
+        self.bf = bf;
+        self
+    }
+
     /// Distorts normalised image coordinates (x = X/Z, y = Y/Z) and returns the pixel position.
     pub fn distort(&self, x: f64, y: f64) -> [f64; 2] {
         let [k1, k2, p1, p2, k3] = self.distortion;

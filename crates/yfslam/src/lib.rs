@@ -3,7 +3,7 @@
 //! What a frame goes through ([`Slam::track`] has it on one page):
 //!
 //! ```text
-//! RgbdFrame ─┬─► features ──────────► dynamic ──────► tracking ──pose──► Tracked
+//! Frame ─┬─► features ──────────► dynamic ──────► tracking ──pose──► Tracked
 //!            │   corners, depth       who may move?   last frame, then local map
 //!            └─► Detector ──boxes────►                    │ worth a keyframe?
 //!                (a thread of its own, joined here)       ▼
@@ -31,7 +31,7 @@
 //! ```
 //! use std::sync::Arc;
 //! use yfslam::image::{DepthImage, Image, RgbImage};
-//! use yfslam::{Camera, Config, RgbdFrame, Slam};
+//! use yfslam::{Camera, Config, Frame, Slam};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let camera = Camera {
@@ -39,7 +39,7 @@
 //!     distortion: [0.0; 5], depth_factor: 5000.0, fps: 30.0, bf: 40.0,
 //! };
 //! let mut slam = Slam::new(Config::default(), &camera, None)?;
-//! let frame = RgbdFrame {
+//! let frame = Frame {
 //!     timestamp_ns: 0,
 //!     color: Arc::new(RgbImage::new(640, 480)),
 //!     depth: Arc::new(DepthImage { raw: Image::new(640, 480), metres_per_unit: 1.0 / 5000.0 }),
@@ -53,32 +53,43 @@
 //! ```
 #![warn(missing_docs)]
 
-pub mod backend;
-pub mod camera;
+mod backend;
+mod camera;
 pub mod config;
+mod context;
 pub mod dense;
-pub mod detection;
-mod detector_thread;
-pub mod dynamic;
-pub mod features;
-pub mod frame;
-pub mod geometry;
+mod detect;
+mod dynamic;
+mod features;
+mod frame;
+mod geometry;
 pub mod image;
-pub mod loops;
-pub mod map;
-pub mod mapping;
-pub mod optimize;
-pub mod packed;
-mod right_eye;
-pub mod sensor;
-pub mod system;
-pub mod tracking;
-mod upright;
+mod loops;
+mod map;
+mod mapping;
+mod optimize;
+mod system;
+mod tracking;
+mod worker;
 
-pub use backend::Execution;
+pub use nalgebra;
+
 pub use camera::Camera;
-pub use config::Config;
-pub use detection::{BoundingBox, Detection, Detector, DetectorError, mask_of_classes};
-pub use frame::RgbdFrame;
-pub use system::{FrameRejected, MapUse, SetupError, Slam, Tracked};
-pub use upright::Upright;
+pub use config::{Config, DepthSource, Method};
+pub use detect::{BoundingBox, Detection, Detector, DetectorError, RollCompensation, mask_of_classes};
+pub use dynamic::{DynamicFilter, FilterInput, FirstPose, MovingMask, Region};
+pub use features::{Feature, FrameFeatures};
+pub use frame::Frame;
+pub use geometry::Pose;
+pub use image::{DepthImage, Image, ImageError, RgbImage};
+pub use loops::LoopClosure;
+pub use map::{KeyFrame, KeyFrameId, KeyframeRelativePose, Landmark, LandmarkId, Map, MapError};
+pub use system::{FrameRejected, MapUse, SavedMap, SetupError, Slam, SlamBuilder, StageTimes, Statistics, Tracked};
+pub use tracking::{LostReason, TrackingState};
+pub use worker::{Execution, Worker};
+
+/// Parts for those who measure the system itself; they may change in any release.
+pub mod unstable {
+    pub use crate::features::{Descriptor, Features, KeyPoint, OrbExtractor};
+    pub use crate::image::{GrayImage, gray_from_rgb};
+}

@@ -5,11 +5,9 @@ use std::error::Error;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use yfslam::config::{Config, DepthSource, FeatureConfig};
-use yfslam::dynamic::Method;
-use yfslam::features::{Features, OrbExtractor};
-use yfslam::image::{DepthImage, GrayImage, Image, RgbImage, gray_from_rgb};
-use yfslam::{BoundingBox, Camera, Detection, RgbdFrame, Slam};
+use yfslam::config::FeatureConfig;
+use yfslam::unstable::{Features, GrayImage, OrbExtractor, gray_from_rgb};
+use yfslam::{BoundingBox, Camera, Config, DepthImage, DepthSource, Detection, Frame, Image, Method, RgbImage, Slam};
 
 struct Counting;
 
@@ -51,7 +49,7 @@ fn texture(seed: u32) -> RgbImage {
 #[test]
 fn a_frame_that_is_no_keyframe_allocates_nothing() -> Result<(), Box<dyn Error>> {
     extraction_allocates_nothing_after_the_first_frame();
-    let methods = [Method::None, Method::Boxes, Method::Yf, Method::Ds, Method::Dyna, Method::Full];
+    let methods = [Method::None, Method::Boxes, Method::YfSlam, Method::DsSlam, Method::DynaSlam, Method::Full];
     for source in [DepthSource::Image, DepthSource::Stereo] {
         for method in methods {
             tracking_allocates_nothing_between_keyframes(method, source)?;
@@ -62,22 +60,11 @@ fn a_frame_that_is_no_keyframe_allocates_nothing() -> Result<(), Box<dyn Error>>
 
 /// A camera at rest before a wall, a person's box in the picture.
 fn tracking_allocates_nothing_between_keyframes(method: Method, source: DepthSource) -> Result<(), Box<dyn Error>> {
-    let camera = Camera {
-        width: 640,
-        height: 480,
-        fx: 535.4,
-        fy: 539.2,
-        cx: 320.1,
-        cy: 247.6,
-        distortion: [0.0; 5],
-        depth_factor: 5000.0,
-        fps: 30.0,
-        bf: 40.0,
-    };
+    let camera = Camera::pinhole(640, 480, 535.4, 539.2, 320.1, 247.6);
     let mut config = Config::default();
     config.dynamic.method = method;
     config.depth.source = source;
-    let mut slam = Slam::new(config, &camera, None)?;
+    let mut slam = Slam::builder(camera).config(config).build()?;
     let mut raw = Image::new(640, 480);
     raw.data_mut().fill(9000u16);
     let bbox = BoundingBox { x_min: 100.0, y_min: 50.0, x_max: 250.0, y_max: 470.0 };
@@ -85,14 +72,9 @@ fn tracking_allocates_nothing_between_keyframes(method: Method, source: DepthSou
     let mut right = RgbImage::new(640, 480);
     // The wall stands 40 px of disparity away.
     (0..480).for_each(|y| right.row_mut(y)[..600].copy_from_slice(&color.row(y)[40..]));
-    let mut frame = RgbdFrame {
-        timestamp_ns: 0,
-        color,
-        depth: Arc::new(DepthImage { raw, metres_per_unit: 1.0 / 5000.0 }),
-        right: Some(Arc::new(right)),
-        detections: Some(vec![Detection { class: 0, score: 0.9, bbox }]),
-        mask: None,
-    };
+    let mut frame = Frame::rgbd(0, color, DepthImage { raw, metres_per_unit: 1.0 / 5000.0 })
+        .with_detections(vec![Detection { class: 0, score: 0.9, bbox }]);
+    frame.right = Some(Arc::new(right));
     let (mut quiet, mut last_keyframe) = (0, 0);
     for i in 0..60 {
         frame.timestamp_ns = i * 33_000_000;

@@ -3,15 +3,14 @@
 
 use std::sync::Arc;
 
-use yfslam::camera::Camera;
-use yfslam::config::{DepthSource, FullConfig};
-use yfslam::dynamic::Method;
-use yfslam::image::{DepthImage, Image, RgbImage};
-use yfslam::system::{FrameRejected, SetupError};
-use yfslam::{BoundingBox, Config, Detection, RgbdFrame, Slam};
+use yfslam::config::FullConfig;
+use yfslam::{
+    BoundingBox, Camera, Config, DepthImage, DepthSource, Detection, Frame, FrameRejected, Image, Method, RgbImage,
+    SetupError, Slam,
+};
 
 /// A grained picture of a wall, with a mask of the given width.
-fn frame(timestamp_ns: i64, mask_width: usize) -> RgbdFrame {
+fn frame(timestamp_ns: i64, mask_width: usize) -> Frame {
     let grain = |i: usize| {
         let mixed = ((i / 640 / 6 * 107 + i % 640 / 6) as u32).wrapping_mul(0x9e37_79b1);
         ((mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b) >> 24) as u8
@@ -20,29 +19,24 @@ fn frame(timestamp_ns: i64, mask_width: usize) -> RgbdFrame {
     raw.data_mut().fill(9000u16);
     let mut mask = Image::new(mask_width, 480);
     (100..400).for_each(|y| mask.row_mut(y)[..mask_width / 2].fill(1));
-    RgbdFrame {
-        timestamp_ns,
-        color: Arc::new(RgbImage::from_vec(640, 480, (0..640 * 480).map(|i| [grain(i); 3]).collect()).unwrap()),
-        depth: Arc::new(DepthImage { raw, metres_per_unit: 1.0 / 5000.0 }),
-        right: None,
-        detections: Some(Vec::new()),
-        mask: Some(Arc::new(mask)),
-    }
+    let color = RgbImage::from_vec(640, 480, (0..640 * 480).map(|i| [grain(i); 3]).collect()).unwrap();
+    let depth = DepthImage { raw, metres_per_unit: 1.0 / 5000.0 };
+    Frame::rgbd(timestamp_ns, color, depth).with_detections(Vec::new()).with_mask(mask)
 }
 
 fn camera() -> Camera {
     let (fx, fy, cx, cy) = (520.0, 520.0, 320.0, 240.0);
-    Camera { width: 640, height: 480, fx, fy, cx, cy, distortion: [0.0; 5], depth_factor: 5000.0, fps: 30.0, bf: 40.0 }
+    Camera::pinhole(640, 480, fx, fy, cx, cy)
 }
 
 #[test]
 fn features_on_a_mask_are_distrusted_and_a_mask_of_another_size_is_refused() {
     let mut config = Config::default();
     config.dynamic.method = Method::Full;
-    let mut slam = Slam::new(config, &camera(), None).unwrap();
+    let mut slam = Slam::builder(camera()).config(config).build().unwrap();
     slam.track(&frame(0, 640)).unwrap();
     let masked = |x: f32, y: f32| x < 320.0 && (100.0..400.0).contains(&y);
-    let features = &slam.last_frame().features.features;
+    let features = &slam.features();
     let on = features.iter().filter(|f| masked(f.raw[0], f.raw[1]));
     assert!(on.clone().count() > 50 && on.clone().all(|f| f.trust == 0.0));
     assert!(features.iter().filter(|f| f.raw[0] > 400.0).all(|f| f.trust > 0.0));
@@ -56,10 +50,10 @@ fn depth_is_used_only_where_it_is_to_come_from_an_image() {
         let mut config = Config::default();
         config.depth.source = source;
         config.dynamic.method = Method::None;
-        let mut slam = Slam::new(config, &camera(), None).unwrap();
+        let mut slam = Slam::builder(camera()).config(config).build().unwrap();
         let tracked = slam.track(&frame(0, 640)).unwrap();
         assert_eq!(tracked.t_world_cam.is_some(), tracks, "{source:?}");
-        assert!(slam.last_frame().features.features.iter().all(|f| f.depth_m.is_some() == tracks), "{source:?}");
+        assert!(slam.features().iter().all(|f| f.depth_m.is_some() == tracks), "{source:?}");
     }
 }
 
@@ -67,16 +61,16 @@ fn depth_is_used_only_where_it_is_to_come_from_an_image() {
 fn a_frame_without_a_right_picture_is_refused_where_depth_is_to_come_from_one() {
     let mut config = Config::default();
     config.depth.source = DepthSource::Stereo;
-    let mut slam = Slam::new(config, &camera(), None).unwrap();
-    assert_eq!(slam.track(&frame(0, 640)).unwrap_err(), FrameRejected::NoRightPicture);
-    let lens = Camera { distortion: [0.1, 0.0, 0.0, 0.0, 0.0], ..camera() };
+    let mut slam = Slam::builder(camera()).config(config).build().unwrap();
+    assert_eq!(slam.track(&frame(0, 640)).unwrap_err(), FrameRejected::NoRightImage);
+    let lens = camera().with_distortion([0.1, 0.0, 0.0, 0.0, 0.0]);
     let mut config = Config::default();
     config.depth.source = DepthSource::Stereo;
-    assert!(matches!(Slam::new(config, &lens, None), Err(SetupError::NotRectified(_))));
+    assert!(matches!(Slam::builder(lens).config(config).build(), Err(SetupError::NotRectified(_))));
 }
 
 /// A wall that stereo sees at 52 px of disparity and another, below, at 26 px.
-fn pair(timestamp_ns: i64) -> RgbdFrame {
+fn pair(timestamp_ns: i64) -> Frame {
     let left = frame(timestamp_ns, 640);
     let mut right = RgbImage::new(640, 480);
     for y in 0..480 {
@@ -84,7 +78,7 @@ fn pair(timestamp_ns: i64) -> RgbdFrame {
         let width = 640 - disparity;
         right.row_mut(y)[..width].copy_from_slice(&left.color.row(y)[disparity..]);
     }
-    RgbdFrame { right: Some(Arc::new(right)), mask: None, ..left }
+    Frame::stereo(timestamp_ns, left.color, right).with_detections(Vec::new())
 }
 
 #[test]
@@ -93,10 +87,10 @@ fn stereo_depth_is_baseline_times_focal_length_by_disparity_the_same_on_every_ru
         let mut config = Config::default();
         config.depth.source = DepthSource::Stereo;
         config.dynamic.method = Method::None;
-        let camera = Camera { bf: 0.1 * 520.0, ..camera() };
-        let mut slam = Slam::new(config, &camera, None).unwrap();
+        let camera = camera().with_bf(0.1 * 520.0);
+        let mut slam = Slam::builder(camera.clone()).config(config).build().unwrap();
         (0..3).for_each(|k| assert!(slam.track(&pair(k)).unwrap().t_world_cam.is_some()));
-        slam.last_frame().features.features.clone()
+        slam.features().to_vec()
     };
     let features = run();
     assert_eq!(features, run());
@@ -114,9 +108,9 @@ fn stereo_depth_is_baseline_times_focal_length_by_disparity_the_same_on_every_ru
 }
 
 /// A wall 1.8 m away, before it a thing 1 m away or, later, other parts of the wall.
-fn with_thing(timestamp_ns: i64, thing: bool) -> RgbdFrame {
+fn with_thing(timestamp_ns: i64, thing: bool) -> Frame {
     let mut frame = frame(timestamp_ns, 640);
-    let (mut color, mut depth) = (frame.color.as_ref().clone(), frame.depth.as_ref().clone());
+    let (mut color, mut depth) = (frame.color.as_ref().clone(), frame.depth.as_deref().unwrap().clone());
     for y in 160..320 {
         // Something else to see than in the rest, and than before.
         let from = if thing { y - 150 } else { y + 150 };
@@ -126,7 +120,7 @@ fn with_thing(timestamp_ns: i64, thing: bool) -> RgbdFrame {
             depth.raw.row_mut(y)[240..400].fill(5000);
         }
     }
-    (frame.color, frame.depth, frame.mask) = (Arc::new(color), Arc::new(depth), None);
+    (frame.color, frame.depth, frame.mask) = (Arc::new(color), Some(Arc::new(depth)), None);
     frame
 }
 
@@ -135,23 +129,23 @@ fn full_forgets_what_is_gone_after_half_a_second_and_nothing_that_stands() {
     for (method, forgets) in [(Method::Full, true), (Method::None, false)] {
         let mut config = Config::default();
         config.dynamic.method = method;
-        let mut slam = Slam::new(config, &camera(), None).unwrap();
+        let mut slam = Slam::builder(camera()).config(config).build().unwrap();
         let mut see = |i: i64, thing: bool| {
             assert!(slam.track(&with_thing(i * 33_000_000, thing)).unwrap().t_world_cam.is_some());
             let near = slam.map().landmarks().filter(|(_, l)| l.position.z < 1.2).count();
             (near, slam.map().landmarks().count())
         };
-        let (things, all) = (0..5).map(|i| see(i, true)).last().unwrap();
-        assert!(things > 30 && all > things + 200, "{things} {all}");
+        let (static_objects, all) = (0..5).map(|i| see(i, true)).last().unwrap();
+        assert!(static_objects > 30 && all > static_objects + 200, "{static_objects} {all}");
         let (left, others) = (5..25).map(|i| see(i, false)).last().unwrap();
-        assert!((left == 0) == forgets && others >= all - things, "{method:?}: {left} {others}");
+        assert!((left == 0) == forgets && others >= all - static_objects, "{method:?}: {left} {others}");
     }
 }
 
 /// A wall beside a screen that shows something else in each frame.
-fn beside_screen(i: i64, is_person: bool) -> RgbdFrame {
+fn beside_screen(i: i64, is_person: bool) -> Frame {
     let mut frame = frame(i * 33_000_000, 640);
-    let (mut color, mut depth) = (frame.color.as_ref().clone(), frame.depth.as_ref().clone());
+    let (mut color, mut depth) = (frame.color.as_ref().clone(), frame.depth.as_deref().unwrap().clone());
     for y in 0..480 {
         let other = (i as usize * 37 + y * 5) % 480;
         let shown: Vec<[u8; 3]> = frame.color.row(other)[..160].iter().rev().copied().collect();
@@ -161,7 +155,7 @@ fn beside_screen(i: i64, is_person: bool) -> RgbdFrame {
     let bbox = BoundingBox { x_min: 0.0, y_min: 0.0, x_max: 480.0, y_max: 480.0 };
     let wall = is_person.then_some(Detection { class: 0, score: 0.9, bbox });
     frame.detections = Some(wall.into_iter().collect());
-    (frame.color, frame.depth, frame.mask) = (Arc::new(color), Arc::new(depth), None);
+    (frame.color, frame.depth, frame.mask) = (Arc::new(color), Some(Arc::new(depth)), None);
     frame
 }
 
@@ -171,14 +165,14 @@ fn full_does_not_lose_the_camera_when_all_that_stands_is_taken_for_a_person() {
         let mut config = Config::default();
         config.dynamic.method = Method::Full;
         config.dynamic.full.doubted_trust = doubted_trust;
-        let mut slam = Slam::new(config, &camera(), None).unwrap();
+        let mut slam = Slam::builder(camera()).config(config).build().unwrap();
         let poses: Vec<_> = (0..10).map(|i| slam.track(&beside_screen(i, i >= 5)).unwrap().t_world_cam).collect();
         assert!(poses[..5].iter().all(Option::is_some));
         assert_eq!(poses[5..].iter().any(Option::is_none), is_lost, "{doubted_trust}: {poses:?}");
         let off_m = poses.iter().flatten().map(|pose| pose.translation.vector.norm()).fold(0.0, f64::max);
         assert!(off_m < 0.02, "{doubted_trust}: {off_m}");
         // The map knows the wall: the box is false, and ignored from then on.
-        let features = &slam.last_frame().features.features;
+        let features = &slam.features();
         let mut on_wall = features.iter().filter(|f| f.raw[0] < 460.0);
         assert!(is_lost || on_wall.clone().count() > 100 && on_wall.all(|f| f.trust == 1.0));
     }

@@ -3,7 +3,7 @@
 use std::io::{Error, ErrorKind, Result};
 use std::path::Path;
 
-use yfslam::image::GrayImage;
+use yfslam::unstable::GrayImage;
 
 /// The image in an 8-bit binary PGM file without comments.
 pub fn read(path: impl AsRef<Path>) -> Result<GrayImage> {

@@ -1,107 +1,96 @@
-//! The owner of the map: takes keyframes in, refines, closes loops; on the calling thread or on one of its own.
+//! Mapping and loop closing, with the map that they own; on the calling thread or on one of their own.
 //!
-//! In: tracked frames that are worth keeping. Out: the map, and what became of each. [`Execution::Inline`] does the work at once, so that
-//! the same frames give the same bits. [`Execution::Threaded`] does it beside tracking, which reads the map as it was after the last
+//! In: tracked frames that become keyframes. Out: the map, and what each keyframe led to. [`Execution::Inline`] does the work at once, so
+//! that the same frames give the same bits. [`Execution::Threaded`] does it beside tracking, which reads the map as it was after the last
 //! finished keyframe; while one is under way no other is taken, so no queue grows. Both run the same [`Backend`].
 
-mod thread;
+mod mapping_worker;
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::config::Config;
+use crate::context::Context;
 use crate::image::RgbImage;
-use crate::loops::{LoopClosed, LoopCloser, Recogniser, WholeAdjustment};
+use crate::loops::{GlobalBundle, LoopCloser, LoopClosure, PlaceRecogniser};
 use crate::map::{KeyFrameId, Map};
 use crate::mapping::Mapper;
-use crate::sensor::SensorModel;
-use crate::tracking::{Sightings, TrackedFrame, TwoViewStart};
-pub use thread::BackendThread;
+use crate::tracking::{ObservationCounts, TrackedFrame, TwoViewMap};
+use crate::worker::Execution;
+use mapping_worker::MappingWorker;
 
-/// Where mapping and loop closing run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Execution {
-    /// On the calling thread, at fixed points: the same bits on every run.
-    #[default]
-    Inline,
-    /// On a thread of their own: tracking never waits for them. Results depend on timing.
-    Threaded,
-}
-
-/// What became of a keyframe.
+/// What the insertion of a keyframe led to.
 #[derive(Clone, Debug)]
 pub struct Inserted {
     /// The keyframe.
     pub keyframe: KeyFrameId,
     /// The loop that it closed.
-    pub loop_closed: Option<LoopClosed>,
+    pub loop_closure: Option<LoopClosure>,
     /// Time for landmarks and local bundle adjustment.
     pub mapping: Duration,
     /// Time for place recognition and loop closing.
-    pub places: Duration,
+    pub loops: Duration,
 }
 
-/// The map and all that changes it.
+/// The map and everything that changes it.
 #[derive(Clone, Debug)]
 pub struct Backend {
-    sensor: Arc<SensorModel>,
-    config: Arc<Config>,
+    context: Arc<Context>,
     map: Map,
     mapper: Mapper,
-    recogniser: Arc<Mutex<Recogniser>>,
+    recogniser: Arc<Mutex<PlaceRecogniser>>,
     loops: LoopCloser,
 }
 
 impl Backend {
-    /// The owner of `map`, whose places it learns.
-    pub fn new(sensor: Arc<SensorModel>, config: Arc<Config>, map: Map) -> Self {
-        let mut recogniser = Recogniser::default();
+    /// Takes a map over and enters its keyframes for place recognition.
+    pub fn new(context: Arc<Context>, map: Map) -> Self {
+        let mut recogniser = PlaceRecogniser::default();
         for (id, _) in map.keyframes() {
             recogniser.learn(&map, id);
         }
         let recogniser = Arc::new(Mutex::new(recogniser));
-        Self { sensor, config, map, mapper: Mapper::default(), recogniser, loops: LoopCloser::default() }
+        Self { context, map, mapper: Mapper::default(), recogniser, loops: LoopCloser::default() }
     }
 
-    /// What recognises places, shared with whoever is lost.
-    fn recogniser(&self) -> Arc<Mutex<Recogniser>> {
+    /// Place recognition, shared with relocalisation.
+    fn recogniser(&self) -> Arc<Mutex<PlaceRecogniser>> {
         Arc::clone(&self.recogniser)
     }
 
-    /// Takes a frame into the map. If that closes a loop, the map is left to be adjusted as a whole.
+    /// Inserts a frame as a keyframe. If that closes a loop, global bundle adjustment is left to the caller.
     fn insert(&mut self, frame: &TrackedFrame, color: &RgbImage) -> Inserted {
         let started = Instant::now();
-        let keyframe = self.mapper.insert(&self.sensor, &self.config, &mut self.map, frame, color);
+        let keyframe = self.mapper.insert(&self.context, &mut self.map, frame, color);
         let mapping = started.elapsed();
         // A panic elsewhere left the index usable: at worst it lacks a landmark.
         self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).learn(&self.map, keyframe);
-        let mut loop_closed = None;
-        if self.config.loops.enabled {
-            loop_closed = self.loops.close(&self.sensor, &self.config, &self.recogniser, &mut self.map, keyframe);
+        let mut loop_closure = None;
+        if self.context.config.loops.enabled {
+            loop_closure = self.loops.close(&self.context, &self.recogniser, &mut self.map, keyframe);
         }
-        Inserted { keyframe, loop_closed, mapping, places: started.elapsed() - mapping }
+        Inserted { keyframe, loop_closure, mapping, loops: started.elapsed() - mapping }
     }
 
     /// Begins the map of a camera without depth.
-    fn begin(&mut self, start: &TwoViewStart) -> Inserted {
+    fn begin(&mut self, start: &TwoViewMap) -> Inserted {
         let started = Instant::now();
-        let keyframe = self.mapper.begin(&self.sensor, &mut self.map, start);
+        let keyframe = self.mapper.begin(&self.context.sensor, &mut self.map, start);
         self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).learn(&self.map, keyframe);
-        Inserted { keyframe, loop_closed: None, mapping: started.elapsed(), places: Duration::ZERO }
+        Inserted { keyframe, loop_closure: None, mapping: started.elapsed(), loops: Duration::ZERO }
     }
 
     /// Adjusts the whole submap of a keyframe.
-    fn adjust_whole(&mut self, keyframe: KeyFrameId) {
-        if let Some(mut whole) = WholeAdjustment::copy(&self.sensor, &self.map, keyframe) {
-            whole.adjust(&self.config.bundle, &|| true);
-            whole.merge(&self.sensor, &mut self.map);
+    fn adjust_submap(&mut self, keyframe: KeyFrameId) {
+        if let Some(mut bundle) = GlobalBundle::copy(&self.context.sensor, &self.map, keyframe) {
+            bundle.adjust(&self.context.config.bundle, &|| true);
+            bundle.merge(&self.context.sensor, &mut self.map);
         }
     }
 
-    fn note(&mut self, sightings: &Sightings) {
-        sightings.visible.iter().for_each(|id| self.map.count_visible(*id));
-        sightings.found.iter().for_each(|id| self.map.count_found(*id));
-        sightings.seen_through.iter().for_each(|id| self.map.note_seen_through(*id));
+    fn count(&mut self, counts: &ObservationCounts) {
+        counts.visible.iter().for_each(|id| self.map.count_visible(*id));
+        counts.found.iter().for_each(|id| self.map.count_found(*id));
+        counts.in_free_space.iter().for_each(|id| self.map.count_free_space(*id));
     }
 
     /// Begins anew with an empty map.
@@ -113,23 +102,23 @@ impl Backend {
     }
 }
 
-/// A backend, here or on its thread.
+/// The owner of the map, on the calling thread or on its own.
 pub enum MapOwner {
-    /// Here.
+    /// On the calling thread.
     Inline(Box<Backend>),
-    /// On its thread.
-    Threaded(BackendThread),
+    /// On its own thread.
+    Threaded(MappingWorker),
 }
 
 impl MapOwner {
-    /// Sets a backend to work.
+    /// Puts a backend where `execution` says.
     ///
     /// # Errors
     /// If the operating system grants no thread.
     pub fn new(backend: Backend, execution: Execution) -> std::io::Result<Self> {
         Ok(match execution {
             Execution::Inline => Self::Inline(Box::new(backend)),
-            Execution::Threaded => Self::Threaded(BackendThread::spawn(backend)?),
+            Execution::Threaded => Self::Threaded(MappingWorker::spawn(backend)?),
         })
     }
 
@@ -137,97 +126,97 @@ impl MapOwner {
     pub fn map(&self) -> &Map {
         match self {
             Self::Inline(backend) => &backend.map,
-            Self::Threaded(thread) => &thread.snapshot,
+            Self::Threaded(worker) => &worker.snapshot,
         }
     }
 
-    /// What recognises places.
-    pub fn recogniser(&self) -> Arc<Mutex<Recogniser>> {
+    /// Place recognition.
+    pub fn recogniser(&self) -> Arc<Mutex<PlaceRecogniser>> {
         match self {
             Self::Inline(backend) => backend.recogniser(),
-            Self::Threaded(thread) => Arc::clone(&thread.recogniser),
+            Self::Threaded(worker) => Arc::clone(&worker.recogniser),
         }
     }
 
-    /// Whether a keyframe would be taken now.
+    /// Returns whether a keyframe would be taken now.
     pub fn is_free(&self) -> bool {
         match self {
             Self::Inline(_) => true,
-            Self::Threaded(thread) => !thread.busy,
+            Self::Threaded(worker) => !worker.busy,
         }
     }
 
-    /// Hands a keyframe over. What became of it, if that is known at once. The first of a submap is waited for: without it nothing can
-    /// be tracked there.
+    /// Hands a keyframe over. Returns the result if it is known at once. The first keyframe of a submap is waited for: without it no
+    /// frame can be tracked there.
     pub fn insert(&mut self, frame: &TrackedFrame, color: &Arc<RgbImage>, is_first: bool) -> Option<Inserted> {
         match self {
             Self::Inline(backend) => {
                 let mut inserted = backend.insert(frame, color);
-                if inserted.loop_closed.is_some() {
+                if inserted.loop_closure.is_some() {
                     let started = Instant::now();
-                    backend.adjust_whole(inserted.keyframe);
-                    inserted.places += started.elapsed();
+                    backend.adjust_submap(inserted.keyframe);
+                    inserted.loops += started.elapsed();
                 }
                 Some(inserted)
             }
-            Self::Threaded(thread) => {
-                thread.insert(frame, color);
-                if is_first { thread.wait() } else { None }
+            Self::Threaded(worker) => {
+                worker.insert(frame, color);
+                if is_first { worker.wait() } else { None }
             }
         }
     }
 
-    /// Begins the map of a camera without depth, and waits for it. Returns what became of the second keyframe.
-    pub fn begin(&mut self, start: TwoViewStart) -> Option<Inserted> {
+    /// Begins the map of a camera without depth, and waits for it. Returns what the second keyframe led to.
+    pub fn begin(&mut self, start: TwoViewMap) -> Option<Inserted> {
         match self {
             Self::Inline(backend) => Some(backend.begin(&start)),
-            Self::Threaded(thread) => {
-                thread.begin(start);
-                thread.wait()
+            Self::Threaded(worker) => {
+                worker.begin(start);
+                worker.wait()
             }
         }
     }
 
-    /// What became of a keyframe handed over earlier, if that is known by now.
+    /// Returns what a keyframe handed over earlier led to, if that is known by now.
     pub fn poll(&mut self) -> Option<Inserted> {
         match self {
             Self::Inline(_) => None,
-            Self::Threaded(thread) => thread.poll(),
+            Self::Threaded(worker) => worker.poll(),
         }
     }
 
-    /// Waits until every keyframe handed over is in the map, and the map adjusted after the last loop.
-    pub fn settle(&mut self) -> Option<Inserted> {
+    /// Waits until every keyframe handed over is in the map, and the map is adjusted after the last loop.
+    pub fn finish(&mut self) -> Option<Inserted> {
         match self {
             Self::Inline(_) => None,
-            Self::Threaded(thread) => thread.settle(),
+            Self::Threaded(worker) => worker.finish(),
         }
     }
 
-    /// Counts which landmarks a frame should have seen and which it saw; takes them out of `sightings`.
-    pub fn note(&mut self, sightings: &mut Sightings) {
+    /// Counts which landmarks a frame had in view and which it matched; takes them out of `counts`.
+    pub fn count(&mut self, counts: &mut ObservationCounts) {
         match self {
             Self::Inline(backend) => {
-                backend.note(sightings);
-                sightings.clear();
+                backend.count(counts);
+                counts.clear();
             }
-            Self::Threaded(thread) => thread.note(sightings),
+            Self::Threaded(worker) => worker.count(counts),
         }
     }
 
-    /// Whether the map can still grow: false once a thread of its own has ended by a panic.
+    /// Returns whether the map can still grow: false once a thread of its own has ended by a panic.
     pub fn is_alive(&self) -> bool {
         match self {
             Self::Inline(_) => true,
-            Self::Threaded(thread) => thread.is_alive(),
+            Self::Threaded(worker) => worker.is_alive(),
         }
     }
 
-    /// Gives the submap with that root up.
-    pub fn forget(&mut self, root: KeyFrameId) {
+    /// Removes the submap with that root.
+    pub fn remove_submap(&mut self, root: KeyFrameId) {
         match self {
             Self::Inline(backend) => backend.map.remove_submap(root),
-            Self::Threaded(thread) => thread.forget(root),
+            Self::Threaded(worker) => worker.remove_submap(root),
         }
     }
 
@@ -235,7 +224,7 @@ impl MapOwner {
     pub fn reset(&mut self) {
         match self {
             Self::Inline(backend) => backend.reset(),
-            Self::Threaded(thread) => thread.reset(),
+            Self::Threaded(worker) => worker.reset(),
         }
     }
 }

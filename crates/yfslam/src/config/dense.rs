@@ -12,9 +12,9 @@ config_section! {
         /// Depth beyond which the sensor's readings make no surface, m; up to there space is free before them. DS-SLAM has
         /// 5; beyond 4 a structured-light camera's steps are as large as a voxel (Khoshelham and Elberink, Sensors 2012).
         max_range_m: f32 = 4.0,
-        /// Pixels along each side of a cell of a piece. At 2 a keyframe takes 0.4 MB of memory.
+        /// Pixels along each side of a cell of a patch. At 2 a keyframe takes 0.4 MB of memory.
         stride_px: usize = 2,
-        /// A keyframe becomes a piece if since the last one the camera has moved this far, m,
+        /// A keyframe becomes a patch if since the last one the camera has moved this far, m,
         min_move_m: f64 = 0.25,
         /// or turned this far, degrees,
         min_turn_deg: f64 = 10.0,
@@ -35,18 +35,18 @@ config_section! {
         hit: f32 = 0.7,
         /// The same for one that a reading passes. Source: OctoMap.
         miss: f32 = 0.4,
-        /// Least probability that is kept, so that things that arrive are noticed. Source: OctoMap.
+        /// Least probability that is kept, so that static_objects that arrive are noticed. Source: OctoMap.
         clamp_min: f32 = 0.12,
-        /// Greatest probability that is kept, so that things that leave are noticed. Source: OctoMap.
+        /// Greatest probability that is kept, so that static_objects that leave are noticed. Source: OctoMap.
         clamp_max: f32 = 0.97,
         /// Probability from which a voxel is occupied. Source: OctoMap.
         occupied: f32 = 0.5,
-        /// Part of a voxel by which a piece's surfaces may be off, after a correction of the map, before they are entered anew.
+        /// Part of a voxel by which a patch's surfaces may be off, after a correction of the map, before they are entered anew.
         follow_voxels: f32 = 0.5,
         /// Memory that the map of `yfslam map` may take, MB (10⁶ bytes), and each of its products beside it: where it would be more, an error
         /// says which resolution fits.
         max_memory_mb: usize = 4000,
-        /// Whether pieces keep the classes of things, if a detector finds any that cannot move. Costs a fifth more memory then. Source:
+        /// Whether patches keep the classes of static_objects, if a detector finds any that cannot move. Costs a fifth more memory then. Source:
         /// DS-SLAM's semantic octree.
         classes: bool = true,
         /// Neighbours, of 26, that a voxel needs in clouds: those with fewer are outliers.

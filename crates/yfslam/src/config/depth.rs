@@ -40,7 +40,7 @@ config_section! {
         /// Features asked for in the right picture, as a multiple of those in the left: more of them, and more are found again. With 2,
         /// seven of ten instead of six have a depth.
         right_features: f64 = 2.0,
-        /// Least depth that is sought, in baselines: nearer things lie where the other picture does not reach.
+        /// Least depth that is sought, in baselines: nearer static_objects lie where the other picture does not reach.
         min_depth_baselines: f64 = 2.0,
         /// Least disparity that counts as a depth, px.
         min_disparity_px: f32 = 1.0,

@@ -44,7 +44,7 @@ config_section! {
         local_radius_factor: f32 = 1.0,
         /// Stands in the place of `mapping.triangulation_neighbours`. Source: ORB-SLAM2.
         triangulation_neighbours: usize = 20,
-        /// Stands in the place of `mapping.min_observation_weight`: a sight without depth weighs 1. Source: ORB-SLAM2.
+        /// Stands in the place of `mapping.min_observation_weight`: a matched without depth weighs 1. Source: ORB-SLAM2.
         min_observation_weight: usize = 3,
         /// Distance between two keyframes, as a share of the median depth in the older one, below which nothing is triangulated between
         /// them. Source: ORB-SLAM.

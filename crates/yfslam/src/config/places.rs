@@ -30,11 +30,11 @@ config_section! {
         /// Standard deviation of the camera's position up to which a place is believed, m: a few far landmarks fit many poses.
         max_position_sigma_m: f64 = 0.05,
         /// Of the landmarks that tracking would find from there, the share that must fit and look the same, if the camera was lost
-        /// just now and can have come there since; the limit rises to `relocalise_min_likeness_beyond` within `max_reach_s`.
-        relocalise_min_likeness: f64 = 0.15,
+        /// just now and can have come there since; the limit rises to `relocalise_min_match_ratio_beyond` within `max_reach_s`.
+        relocalise_min_match_ratio: f64 = 0.15,
         /// The same for any other place. In corridors whose doors and lamps repeat, places that the map does not have were taken for
         /// others with up to 0.34; right ones had 0.36 to 1.2.
-        relocalise_min_likeness_beyond: f64 = 0.4,
+        relocalise_min_match_ratio_beyond: f64 = 0.4,
         /// Speed up to which a camera that is lost is thought to move on, m/s.
         max_speed_m_per_s: f64 = 1.5,
         /// Time after which it may be anywhere, s.
@@ -57,11 +57,11 @@ config_section! {
         min_keyframes_between: u64 = 10,
         /// Landmarks of the old place that must fit the keyframe. Source: ORB-SLAM2.
         min_inliers: usize = 40,
-        /// As `relocalise_min_likeness`, for a keyframe in an old place: a wrong loop ruins the map.
-        min_likeness: f64 = 0.25,
+        /// As `relocalise_min_match_ratio`, for a keyframe in an old place: a wrong loop ruins the map.
+        min_match_ratio: f64 = 0.25,
         /// The same where the loop would take away more drift than the four limits below allow, and between submaps. Opposite corridors
         /// looked alike up to 0.34, right places up to 0.95.
-        min_likeness_of_jump: f64 = 0.5,
+        min_match_ratio_of_jump: f64 = 0.5,
         /// Drift that needs no way, m.
         max_drift_m: f64 = 0.3,
         /// Drift for each metre of way, m. Feature-based RGB-D odometry drifts by a hundredth or so.

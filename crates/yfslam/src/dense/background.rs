@@ -1,6 +1,6 @@
 //! The view without people: colour and depth of what they hide, from other keyframes.
 //!
-//! In: a survey with its volume, and a view. Out: its picture, with the pixels that nobody has seen left out. DynaSLAM (IEEE RA-L 2018,
+//! In: a dense_map with its volume, and a view. Out: its picture, with the pixels that nobody has seen left out. DynaSLAM (IEEE RA-L 2018,
 //! section III-E) projects earlier frames into the view. Here depth is projected, and colour looked up at that depth in the frames that
 //! are nearest: it stays sharp, and one of them that still shows somebody is outvoted.
 //!
@@ -8,10 +8,10 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::dense::beside::beside;
-use crate::dense::piece::{CellGrid, Piece};
+use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
+use crate::dense::static_recovery::beside;
 use crate::dense::voxels::voxel_at;
-use crate::dense::{Survey, Volume};
+use crate::dense::{DenseMap, Volume};
 use crate::geometry::Pose;
 use crate::image::{Image, RgbImage};
 
@@ -49,11 +49,11 @@ enum Sureness {
     Likely,
 }
 
-/// A piece that is asked.
+/// A patch that is asked.
 struct Source<'a> {
     /// How far its view is from the one wanted.
     apart: f64,
-    piece: &'a Piece,
+    patch: &'a KeyframePatch,
     /// Which of its cells show what stands beside somebody.
     beside: &'a [bool],
     grid: &'a CellGrid,
@@ -69,11 +69,11 @@ impl Source<'_> {
     fn look(&self, point: &Point3<f32>, sureness: Sureness) -> Option<Vector3<f32>> {
         let p = self.t_view_source.inverse_transform_point(point);
         let at = self.grid.project(&p)?;
-        look(self.grid, self.piece, at, p.z, sureness, self.beside)
+        look(self.grid, self.patch, at, p.z, sureness, self.beside)
     }
 
-    /// Brings its light to that of the view's own piece, by what both see.
-    fn match_light(&mut self, grid: &CellGrid, own: &Piece) {
+    /// Brings its light to that of the view's own patch, by what both see.
+    fn match_light(&mut self, grid: &CellGrid, own: &KeyframePatch) {
         let (mut ours, mut theirs, mut count) = (Vector3::zeros(), Vector3::zeros(), 0);
         for (cell, [x, y]) in grid.rays().iter().enumerate().step_by(LIGHT_STEP) {
             let Some(z) = own.surface_m(cell) else { continue };
@@ -89,52 +89,52 @@ impl Source<'_> {
     }
 }
 
-/// Makes views of a survey without what moves.
+/// Makes views of a dense_map without what moves.
 pub struct Backgrounds<'a> {
-    survey: &'a Survey,
+    dense_map: &'a DenseMap,
     volume: &'a Volume,
-    /// Of each piece that the volume has, which of its cells show what stands beside somebody.
+    /// Of each patch that the volume has, which of its cells show what stands beside somebody.
     beside: Vec<Vec<bool>>,
 }
 
 impl<'a> Backgrounds<'a> {
-    /// Views of a survey with its volume. `told` hears how many pieces are looked through.
-    pub fn new(survey: &'a Survey, volume: &'a Volume, mut told: impl FnMut(usize)) -> Self {
-        let mut besides = Vec::with_capacity(survey.pieces.len());
-        for (number, one) in survey.pieces.iter().enumerate() {
+    /// DepthHistory of a dense_map with its volume. `told` hears how many patches are looked through.
+    pub fn new(dense_map: &'a DenseMap, volume: &'a Volume, mut told: impl FnMut(usize)) -> Self {
+        let mut besides = Vec::with_capacity(dense_map.patches.len());
+        for (number, one) in dense_map.patches.iter().enumerate() {
             told(number);
-            let shown = |t_map_cam: Isometry3<f32>| beside(volume, &t_map_cam, &survey.grid, &one.piece);
+            let shown = |t_map_cam: Isometry3<f32>| beside(volume, &t_map_cam, &dense_map.grid, &one.patch);
             besides.push(volume.pose(number).map(|pose| shown(pose.cast())).unwrap_or_default());
         }
-        Self { survey, volume, beside: besides }
+        Self { dense_map, volume, beside: besides }
     }
 
-    /// The view of piece `number`: of what it shows itself, what does not move is kept.
-    pub fn of_piece(&self, number: usize) -> Option<Background> {
-        let one = self.survey.pieces.get(number)?;
+    /// The view of patch `number`: of what it shows itself, what does not move is kept.
+    pub fn of_patch(&self, number: usize) -> Option<Background> {
+        let one = self.dense_map.patches.get(number)?;
         let sources = self.sources(&one.t_world_cam, Some(number));
-        Some(background(&self.survey.grid, sources, &one.piece, &self.beside[number]))
+        Some(background(&self.dense_map.grid, sources, &one.patch, &self.beside[number]))
     }
 
-    /// The view of a frame that is none of the survey's pieces, from `t_world_cam`: `own` is cut from it on the same cells.
-    pub fn of_frame(&self, own: &Piece, t_world_cam: &Pose) -> Background {
+    /// The view of a frame that is none of the dense_map's patches, from `t_world_cam`: `own` is cut from it on the same cells.
+    pub fn of_frame(&self, own: &KeyframePatch, t_world_cam: &Pose) -> Background {
         let sources = self.sources(t_world_cam, None);
         let t_map_view = sources.first().map(|source| source.t_map_source * source.t_view_source.inverse());
-        let beside = t_map_view.map(|t_map_view| beside(self.volume, &t_map_view, &self.survey.grid, own));
-        background(&self.survey.grid, sources, own, &beside.unwrap_or_default())
+        let beside = t_map_view.map(|t_map_view| beside(self.volume, &t_map_view, &self.dense_map.grid, own));
+        background(&self.dense_map.grid, sources, own, &beside.unwrap_or_default())
     }
 
-    /// All pieces but the view's own, nearest first.
+    /// All patches but the view's own, nearest first.
     fn sources(&self, t_world_cam: &Pose, own: Option<usize>) -> Vec<Source<'_>> {
         let mut sources: Vec<Source> = Vec::new();
-        for (number, one) in self.survey.pieces.iter().enumerate().filter(|(number, _)| Some(*number) != own) {
+        for (number, one) in self.dense_map.patches.iter().enumerate().filter(|(number, _)| Some(*number) != own) {
             let Some(t_map_source) = self.volume.pose(number) else { continue };
             let t_view_source = t_world_cam.inverse() * one.t_world_cam;
             sources.push(Source {
                 apart: t_view_source.translation.vector.norm() + 2.0 * t_view_source.rotation.angle(),
-                piece: &one.piece,
+                patch: &one.patch,
                 beside: &self.beside[number],
-                grid: &self.survey.grid,
+                grid: &self.dense_map.grid,
                 volume: self.volume,
                 t_view_source: t_view_source.cast(),
                 t_map_source: t_map_source.cast(),
@@ -146,8 +146,8 @@ impl<'a> Backgrounds<'a> {
     }
 }
 
-/// The view on the cells of `grid`, from `sources` and what its `own` piece shows, also `beside` what moves.
-fn background(grid: &CellGrid, mut sources: Vec<Source<'_>>, own: &Piece, beside: &[bool]) -> Background {
+/// The view on the cells of `grid`, from `sources` and what its `own` patch shows, also `beside` what moves.
+fn background(grid: &CellGrid, mut sources: Vec<Source<'_>>, own: &KeyframePatch, beside: &[bool]) -> Background {
     sources.iter_mut().take(SOURCES).for_each(|source| source.match_light(grid, own));
     let nowhere = vec![0.0; grid.columns() * grid.rows()];
     let sure_m = projected_depth(grid, &sources, Sureness::Sure, &nowhere);
@@ -183,11 +183,11 @@ fn projected_depth(grid: &CellGrid, sources: &[Source], sureness: Sureness, know
     let (columns, rows) = (grid.columns() as i32, grid.rows() as i32);
     let mut depth_m = known.to_vec();
     for source in sources {
-        let Source { piece, beside, volume, t_view_source, t_map_source, .. } = source;
+        let Source { patch, beside, volume, t_view_source, t_map_source, .. } = source;
         let config = volume.config();
         for (cell, [x, y]) in source.grid.rays().iter().enumerate() {
             let likely = sureness == Sureness::Likely;
-            let Some(reading) = piece.reading(cell).filter(|reading| reading.moves == likely) else { continue };
+            let Some(reading) = patch.reading(cell).filter(|reading| reading.moves == likely) else { continue };
             let z = reading.depth_m;
             let p = Point3::new(x * z, y * z, z);
             let seen = t_view_source * p;
@@ -241,11 +241,11 @@ fn vote(sources: &[Source], point: &Point3<f32>, sureness: Sureness) -> Option<[
     }))
 }
 
-/// The colour of a piece at a position, between its cells; `None` if another surface or something that moves is there. If that is
+/// The colour of a patch at a position, between its cells; `None` if another surface or something that moves is there. If that is
 /// asked for what is likely, such cells are left out, and those that show what stands `beside` are not.
 fn look(
     grid: &CellGrid,
-    piece: &Piece,
+    patch: &KeyframePatch,
     [column, row]: [f32; 2],
     z: f32,
     sureness: Sureness,
@@ -265,17 +265,17 @@ fn look(
             continue;
         }
         let cell = r as usize * grid.columns() + c as usize;
-        let depth = piece.reading(cell).map(|reading| reading.depth_m);
+        let depth = patch.reading(cell).map(|reading| reading.depth_m);
         let other = depth.is_some_and(|depth| (depth - z).abs() > SAME_M + SAME_SHARE * z);
         let likely = sureness == Sureness::Likely;
-        if other || piece.moves(cell) && !(likely && beside[cell]) {
+        if other || patch.moves(cell) && !(likely && beside[cell]) {
             if likely {
                 continue;
             }
             return None;
         }
         same |= depth.is_some();
-        sum += Vector3::from(piece.color(cell).map(f32::from)) * weight;
+        sum += Vector3::from(patch.color(cell).map(f32::from)) * weight;
         weights += weight;
     }
     let least = if sureness == Sureness::Likely { LIKELY_SHARE } else { 0.0 };
@@ -305,9 +305,10 @@ mod tests {
                 _ => {}
             }
         }
-        let survey = Survey::of_poses(grid.clone(), [(Pose::identity(), marked.clone()), (Pose::identity(), other)]);
-        let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
-        let seen = Backgrounds::new(&survey, &volume, |_| {}).of_piece(0).unwrap();
+        let dense_map =
+            DenseMap::of_poses(grid.clone(), [(Pose::identity(), marked.clone()), (Pose::identity(), other)]);
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let seen = Backgrounds::new(&dense_map, &volume, |_| {}).of_patch(0).unwrap();
         let known = |column: usize, row: usize| seen.valid.data()[row * columns + column];
         assert!(known(half - 1, 30) && known(half + 4, 30) && known(columns - 1, 30), "the wall goes on");
         assert!(!known(4, 4), "somebody in the way stays out");
@@ -330,12 +331,12 @@ mod tests {
             own.color[cell] = stripe(x * 3.0 + 100.0);
         }
         own.depth.iter_mut().filter(|d| **d < 3000).for_each(|d| *d |= 1 << 15);
-        let pieces = [(Pose::identity(), own.clone()), (moved, other)];
-        let survey = Survey::of_poses(grid.clone(), pieces);
-        let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
-        let views = Backgrounds::new(&survey, &volume, |_| {});
-        let seen = views.of_piece(0).unwrap();
-        assert_eq!(seen, views.of_frame(&own, &Pose::identity()), "it need not be one of the pieces");
+        let patches = [(Pose::identity(), own.clone()), (moved, other)];
+        let dense_map = DenseMap::of_poses(grid.clone(), patches);
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let views = Backgrounds::new(&dense_map, &volume, |_| {});
+        let seen = views.of_patch(0).unwrap();
+        assert_eq!(seen, views.of_frame(&own, &Pose::identity()), "it need not be one of the patches");
         assert!(seen.valid.data().iter().all(|valid| *valid), "everything is known");
         let mut filled = 0;
         for cell in (0..own.depth.len()).filter(|cell| own.moves(*cell)) {

@@ -1,7 +1,7 @@
-//! What occupied space is: a class for each voxel, of the things that a detector found (DS-SLAM, IROS 2018, section III-E, maps them so).
+//! What occupied space is: a class for each voxel, of the static_objects that a detector found (DS-SLAM, IROS 2018, section III-E, maps them so).
 //!
-//! In: a survey whose pieces have classes, and its volume. Out: the class of each voxel. Each piece has one voice in a voxel: the class of
-//! most of its readings there. A voxel keeps one class, with log-odds that rise by OctoMap's step of a hit when a piece has that class and
+//! In: a dense_map whose patches have classes, and its volume. Out: the class of each voxel. Each patch has one voice in a voxel: the class of
+//! most of its readings there. A voxel keeps one class, with log-odds that rise by OctoMap's step of a hit when a patch has that class and
 //! fall by that of a miss when it has another or none, clamped above; where they fall below even odds the next class takes its place. So
 //! a detector that misses a thing in half of the views still names it, and a box that was wrong is forgotten.
 
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use nalgebra::Isometry3;
 
 use crate::dense::voxels::{Block, VOXELS, Voxel, block_of, place_of, voxel_at};
-use crate::dense::{DenseConfig, Survey, SurveyPiece, Volume};
+use crate::dense::{DenseConfig, DenseMap, PlacedPatch, Volume};
 
 /// Classes of voxels.
 #[derive(Clone, Debug, Default)]
@@ -25,14 +25,14 @@ struct Held {
     log_odds: f32,
 }
 
-/// The classes of a survey. `told` hears how many pieces are done.
-pub fn classes(survey: &Survey, volume: &Volume, mut told: impl FnMut(usize)) -> Classes {
+/// The classes of a dense_map. `told` hears how many patches are done.
+pub fn classes(dense_map: &DenseMap, volume: &Volume, mut told: impl FnMut(usize)) -> Classes {
     let mut classes = Classes::default();
     let mut seen = Vec::new();
-    for (number, one) in survey.pieces.iter().enumerate() {
+    for (number, one) in dense_map.patches.iter().enumerate() {
         told(number);
-        let Some(pose) = volume.pose(number).filter(|_| !one.piece.class.is_empty()) else { continue };
-        readings(survey, one, &pose.cast(), volume.config(), &mut seen);
+        let Some(pose) = volume.pose(number).filter(|_| !one.patch.class.is_empty()) else { continue };
+        readings(dense_map, one, &pose.cast(), volume.config(), &mut seen);
         seen.sort_unstable();
         for in_voxel in seen.chunk_by(|a, b| a.0 == b.0) {
             let most = in_voxel.chunk_by(|a, b| a.1 == b.1).max_by_key(|alike| alike.len());
@@ -46,17 +46,17 @@ pub fn classes(survey: &Survey, volume: &Volume, mut told: impl FnMut(usize)) ->
 
 /// The voxel and the class of each reading that ends on a surface.
 fn readings(
-    survey: &Survey,
-    one: &SurveyPiece,
+    dense_map: &DenseMap,
+    one: &PlacedPatch,
     pose: &Isometry3<f32>,
     config: &DenseConfig,
     seen: &mut Vec<(Voxel, u8)>,
 ) {
     seen.clear();
     let per_m = 1.0 / config.resolution_m;
-    for (cell, [x, y]) in survey.grid.rays().iter().enumerate() {
-        let surface_m = one.piece.surface_m(cell).filter(|z| *z <= config.max_range_m);
-        if let (Some(z), Some(class)) = (surface_m, one.piece.class(cell)) {
+    for (cell, [x, y]) in dense_map.grid.rays().iter().enumerate() {
+        let surface_m = one.patch.surface_m(cell).filter(|z| *z <= config.max_range_m);
+        if let (Some(z), Some(class)) = (surface_m, one.patch.class(cell)) {
             seen.push((voxel_at(&(pose * nalgebra::Point3::new(x * z, y * z, z)), per_m), class));
         }
     }
@@ -68,7 +68,7 @@ impl Classes {
         self.blocks.get(&block_of(voxel)).map_or(0, |held| held[place_of(voxel)].class)
     }
 
-    /// A piece says that a voxel has a class, or, with 0, none.
+    /// A patch says that a voxel has a class, or, with 0, none.
     fn hear(&mut self, config: &DenseConfig, voxel: Voxel, class: u8) {
         // What has no class where there is none tells nothing.
         let block = block_of(voxel);
@@ -95,24 +95,24 @@ mod tests {
     use nalgebra::{Point3, UnitQuaternion};
 
     use super::*;
-    use crate::dense::{CellGrid, Piece, scene};
+    use crate::dense::{CellGrid, KeyframePatch, scene};
     use crate::geometry::Pose;
 
-    /// A thing at 1.52 m that pieces take for these classes, before a wall; `None` where nobody looked.
+    /// A thing at 1.52 m that patches take for these classes, before a wall; `None` where nobody looked.
     fn held(told: &[Option<u8>]) -> (u8, u8) {
         let config = DenseConfig::default();
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
-        let piece = |class: Option<u8>| -> Piece {
-            let piece = scene::wall(&grid, 3.01, Some(1.52));
-            let Some(class) = class else { return piece };
-            let depths = piece.clone();
+        let patch = |class: Option<u8>| -> KeyframePatch {
+            let patch = scene::wall(&grid, 3.01, Some(1.52));
+            let Some(class) = class else { return patch };
+            let depths = patch.clone();
             let mut of_cells = (0..).map(|cell| if depths.surface_m(cell) < Some(2.0) { class } else { 0 });
             let cells: Vec<u8> = of_cells.by_ref().take(grid.rays().len()).collect();
-            Piece { class: cells, ..piece }
+            KeyframePatch { class: cells, ..patch }
         };
-        let survey = Survey::of_poses(grid.clone(), told.iter().map(|class| (Pose::identity(), piece(*class))));
-        let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
-        let classes = classes(&survey, &volume, |_| {});
+        let dense_map = DenseMap::of_poses(grid.clone(), told.iter().map(|class| (Pose::identity(), patch(*class))));
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let classes = classes(&dense_map, &volume, |_| {});
         let at = |z: f32| classes.get(voxel_at(&Point3::new(0.01, 0.01, z), 20.0));
         (at(1.52), at(3.01))
     }

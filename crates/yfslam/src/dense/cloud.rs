@@ -1,13 +1,13 @@
 //! A coloured point cloud: one point for each occupied voxel.
 //!
-//! In: a survey and its volume. Out: the mean of the readings in each occupied voxel, those without enough occupied neighbours left out.
+//! In: a dense_map and its volume. Out: the mean of the readings in each occupied voxel, those without enough occupied neighbours left out.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Point3};
 
 use crate::dense::voxels::{Block, VOXELS, Voxel, block_of, place_of, voxel_at, voxel_in};
-use crate::dense::{Survey, Volume};
+use crate::dense::{DenseMap, Volume};
 
 /// A point of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,16 +28,16 @@ struct Sum {
     count: u32,
 }
 
-/// The cloud of a survey, ordered by block, then by place in it. `told` hears how many pieces are done.
-pub fn cloud(survey: &Survey, volume: &Volume, mut told: impl FnMut(usize)) -> Vec<CloudPoint> {
+/// The cloud of a dense_map, ordered by block, then by place in it. `told` hears how many patches are done.
+pub fn cloud(dense_map: &DenseMap, volume: &Volume, mut told: impl FnMut(usize)) -> Vec<CloudPoint> {
     let config = volume.config();
     let per_m = 1.0 / config.resolution_m;
     let mut sums: BTreeMap<Block, Vec<Sum>> = BTreeMap::new();
-    for (number, one) in survey.pieces.iter().enumerate() {
+    for (number, one) in dense_map.patches.iter().enumerate() {
         told(number);
         let Some(pose) = volume.pose(number) else { continue };
         let pose: Isometry3<f32> = pose.cast();
-        for (p, color) in one.piece.points(&survey.grid, config.max_range_m) {
+        for (p, color) in one.patch.points(&dense_map.grid, config.max_range_m) {
             let p = pose * p;
             let voxel = voxel_at(&p, per_m);
             let block = block_of(voxel);
@@ -93,7 +93,7 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::dense::piece::CellGrid;
+    use crate::dense::keyframe_patch::CellGrid;
     use crate::dense::{DenseConfig, scene};
     use crate::geometry::Pose;
 
@@ -101,10 +101,10 @@ mod tests {
     fn a_cloud_has_one_point_a_voxel_on_the_surface_with_its_colour() {
         let config = DenseConfig::default();
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
-        let piece = scene::wall(&grid, 2.01, None);
-        let survey = Survey::of_poses(grid, [(Pose::identity(), piece)]);
-        let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
-        let points = cloud(&survey, &volume, |_| {});
+        let patch = scene::wall(&grid, 2.01, None);
+        let dense_map = DenseMap::of_poses(grid, [(Pose::identity(), patch)]);
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let points = cloud(&dense_map, &volume, |_| {});
         assert!(points.iter().all(|p| (p.position_m[2] - 2.01).abs() < 1e-3 && p.color == [120, 130, 140]));
         let mut voxels: Vec<_> = points.iter().map(|p| p.voxel).collect();
         voxels.sort_unstable();

@@ -70,17 +70,17 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::dense::{CellGrid, DenseConfig, Survey, scene, up};
+    use crate::dense::{CellGrid, DenseConfig, DenseMap, gravity, scene};
     use crate::geometry::Pose;
 
     #[test]
     fn a_wall_ahead_is_in_the_way_and_the_space_before_it_is_free() {
         let config = DenseConfig::default();
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
-        let piece = scene::wall(&grid, 2.02, None);
-        let survey = Survey::of_poses(grid, [(Pose::identity(), piece)]);
-        let turn: UnitQuaternion<f64> = up::of_camera();
-        let volume = survey.volume(&config, &turn, |_| {});
+        let patch = scene::wall(&grid, 2.02, None);
+        let dense_map = DenseMap::of_poses(grid, [(Pose::identity(), patch)]);
+        let turn: UnitQuaternion<f64> = gravity::of_camera();
+        let volume = dense_map.volume(&config, &turn, |_| {});
         let ground = ground_grid(&volume, [-0.3, 0.3]);
         let at = |x: f64, y: f64| {
             let [column, row] = [(x, 0), (y, 1)].map(|(v, axis)| ((v - ground.origin_m[axis]) / 0.05).floor() as usize);

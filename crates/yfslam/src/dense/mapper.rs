@@ -1,127 +1,150 @@
-//! The dense map beside the SLAM system: pieces that hang on keyframes, and the volume that follows them.
+//! The dense map while the system runs: keyframe patches with poses relative to keyframes, and the volume that follows them.
 //!
-//! In: pieces with the keyframe that each hangs on, and the map whenever it was corrected. Out: a volume that is consistent with the
-//! trajectory at any time. With [`Execution::Inline`] it is entered at once; with [`Execution::Threaded`] on a thread of its own, which
-//! tracking never waits for: a piece that comes while two are waiting is passed over.
+//! In: patches with the keyframe that each belongs to, and the map whenever it was corrected. Out: a volume that is consistent with the
+//! trajectory at any time. With [`Execution::Inline`] a patch is entered at once; with [`Execution::Threaded`] on a thread of its own,
+//! which tracking never waits for: a patch that comes while two are waiting is left out.
 
 use std::collections::BTreeMap;
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::thread::JoinHandle;
+use std::sync::Arc;
 
 use nalgebra::UnitQuaternion;
 
-use crate::backend::Execution;
 use crate::camera::Camera;
-use crate::dense::piece::{CellGrid, Piece};
+use crate::config::{DenseConfig, DynamicConfig};
+use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
+use crate::dense::object_masks::ObjectMasks;
 use crate::dense::volume::Volume;
-use crate::dense::{DenseConfig, DenseError, Survey, SurveyPiece};
-use crate::dynamic::Tie;
+use crate::dense::{DenseError, DenseMap, PlacedPatch, gravity};
+use crate::detect::Detection;
+use crate::dynamic::MovingMask;
 use crate::geometry::Pose;
 use crate::image::{DepthImage, RgbImage};
-use crate::map::{KeyFrameId, Map};
+use crate::map::{KeyFrameId, KeyframeRelativePose, Map};
+use crate::worker::{Execution, Worker};
 
-/// Pieces that may wait for the thread.
+/// Patches that may wait for the thread.
 const WAITING: usize = 2;
 
-/// Keeps the pieces of keyframes where the map has them.
+/// Keeps the patches of keyframes at the poses that the map gives them.
 pub struct DenseMapper {
     config: DenseConfig,
     grid: CellGrid,
-    ties: Vec<Tie>,
-    /// Time and pose, world from camera, of the last piece as it was cut.
+    poses: Vec<KeyframeRelativePose>,
+    /// Time and pose, world from camera, of the last patch when it was extracted.
     last: Option<(i64, Pose)>,
-    keeper: Keeper,
-    /// Memory of the pieces.
+    fusion: FusionOwner,
+    /// Memory of the patches.
     bytes: usize,
     class_names: Vec<String>,
-    passed_over: usize,
+    /// The class in patches of each class of the detector; `None` where patches have no classes.
+    class_ids: Option<Vec<u8>>,
+    patches_skipped: usize,
 }
 
-/// Where the pieces are kept and entered.
-enum Keeper {
-    Inline(Box<Store>),
-    Threaded {
-        sender: SyncSender<Order>,
-        thread: JoinHandle<Store>,
-    },
-    /// The thread has ended by a panic.
-    Gone,
+/// What a patch is extracted from.
+pub struct Source<'a> {
+    /// The colour image.
+    pub color: &'a RgbImage,
+    /// The depth image.
+    pub depth: &'a DepthImage,
+    /// What moves.
+    pub moving: &'a MovingMask,
+    /// Detections of objects that cannot move; `None` where no detector searched for such.
+    pub objects: Option<&'a [Detection]>,
 }
 
-/// What the thread is told.
-enum Order {
-    Follow(Vec<(i64, Piece)>, Vec<Option<Pose>>),
-    Show(SyncSender<Volume>),
+/// A patch with its time, ns; shared with snapshots.
+type TimedPatch = (i64, Arc<KeyframePatch>);
+
+/// Where the patches are kept and entered.
+enum FusionOwner {
+    Inline(Box<Fusion>),
+    Threaded(Worker<Request, Answer>),
+}
+
+/// A request to the thread.
+enum Request {
+    Place(Vec<TimedPatch>, Vec<Option<Pose>>),
+    Volume,
+    Patches,
     Clear,
 }
 
-/// Pieces and volume.
+/// Its answer.
+enum Answer {
+    Volume(Box<Volume>),
+    Patches(Vec<TimedPatch>),
+}
+
+/// Patches and volume.
 #[derive(Clone, Debug)]
-struct Store {
+struct Fusion {
     grid: CellGrid,
     /// Turns the world so that the z-axis points up.
     up: UnitQuaternion<f64>,
-    pieces: Vec<(i64, Piece)>,
+    patches: Vec<TimedPatch>,
     volume: Volume,
 }
 
 impl DenseMapper {
-    /// A mapper for one camera. Its volume's z-axis points up in the first picture, as in ROS (REP 103).
+    /// Prepares for one camera. The z-axis of the volume points up in the first image, as in ROS (REP 103).
     ///
     /// # Errors
-    /// For a value of the configuration that cannot work, or if a thread cannot be started.
+    /// For a value of the configuration out of range, or if a thread cannot be started.
     pub fn new(config: &DenseConfig, camera: &Camera, execution: Execution) -> Result<Self, DenseError> {
         config.validate()?;
         let grid = CellGrid::new(camera, config.stride_px);
-        let store =
-            Store { grid: grid.clone(), up: super::up::of_camera(), pieces: Vec::new(), volume: Volume::new(config) };
-        let keeper = match execution {
-            Execution::Inline => Keeper::Inline(Box::new(store)),
+        let mut fusion =
+            Fusion { grid: grid.clone(), up: gravity::of_camera(), patches: Vec::new(), volume: Volume::new(config) };
+        let fusion = match execution {
+            Execution::Inline => FusionOwner::Inline(Box::new(fusion)),
             Execution::Threaded => {
-                let (sender, orders) = sync_channel(WAITING);
-                let builder = std::thread::Builder::new().name("yfslam-dense".into());
-                Keeper::Threaded { sender, thread: builder.spawn(move || store.obey(&orders))? }
+                FusionOwner::Threaded(Worker::spawn("dense map", WAITING, |_| move |request| fusion.handle(request))?)
             }
         };
-        let (ties, class_names) = (Vec::new(), Vec::new());
-        Ok(Self { config: config.clone(), grid, ties, last: None, keeper, bytes: 0, class_names, passed_over: 0 })
+        Ok(Self {
+            config: config.clone(),
+            grid,
+            poses: Vec::new(),
+            last: None,
+            fusion,
+            bytes: 0,
+            class_names: Vec::new(),
+            class_ids: None,
+            patches_skipped: 0,
+        })
     }
 
-    /// The mapper with the pieces of an earlier session, whose `map` this session goes on with; they come before its own.
+    /// Adds the patches of an earlier session, whose `map` this session continues; they come before its own.
     ///
     /// # Errors
-    /// If the pieces are of other cells or another map.
-    pub fn with_pieces(mut self, survey: Survey, map: &Map) -> Result<Self, DenseError> {
-        let Survey { grid, mut pieces, apart, class_names } = survey;
+    /// If the patches have other cells or belong to another map.
+    pub fn with_earlier(mut self, earlier: DenseMap, map: &Map) -> Result<Self, DenseError> {
+        let DenseMap { grid, mut patches, apart, class_names } = earlier;
         if grid != self.grid {
             let (found, wanted) = (grid.stride_px(), self.grid.stride_px());
             let (width, height) = (grid.camera().width, grid.camera().height);
             return Err(DenseError::Cells { found, wanted, width, height });
         }
         for (at, one) in apart {
-            pieces.insert(at.min(pieces.len()), one);
+            patches.insert(at.min(patches.len()), one);
         }
         let keyframes: BTreeMap<u64, (KeyFrameId, Pose)> =
             map.keyframes().map(|(id, k)| (k.sequence, (id, k.t_cam_world))).collect();
-        let mut known = Vec::with_capacity(pieces.len());
-        for SurveyPiece { timestamp_ns, keyframe, t_world_cam, piece } in pieces {
+        let mut known = Vec::with_capacity(patches.len());
+        for PlacedPatch { timestamp_ns, keyframe, t_world_cam, patch } in patches {
             let (id, t_reference_world) = keyframes.get(&keyframe).ok_or(DenseError::Keyframe(keyframe))?;
-            self.ties.push((*id, (t_reference_world * t_world_cam).inverse()));
-            self.bytes += piece.bytes();
-            known.push((timestamp_ns, piece));
+            self.poses.push((*id, (t_reference_world * t_world_cam).inverse()));
+            self.bytes += patch.bytes();
+            known.push((timestamp_ns, Arc::new(patch)));
         }
         self.class_names = class_names;
-        let poses = self.poses(map);
-        self.keeper.follow(known, poses);
+        let poses = self.world_poses(map);
+        self.fusion.place(known, poses);
         Ok(self)
     }
 
-    /// The cells of its pieces.
-    pub fn grid(&self) -> &CellGrid {
-        &self.grid
-    }
-
-    /// Whether a keyframe tells enough beyond the last piece to become one.
+    /// Returns whether a keyframe shows enough beyond the last patch to become one.
     pub fn is_due(&self, timestamp_ns: i64, t_world_cam: &Pose) -> bool {
         let Some((last_ns, last)) = &self.last else { return true };
         let moved = last.inverse() * t_world_cam;
@@ -131,14 +154,23 @@ impl DenseMapper {
             || timestamp_ns.saturating_sub(*last_ns) as f64 * 1e-9 >= config.min_gap_s
     }
 
-    /// Cuts the piece of a frame: `moves(position, edge)` tells whether a position of the image, px, is within `edge` px of what moves.
-    pub fn cut(&self, color: &RgbImage, depth: &DepthImage, moves: impl Fn([f32; 2], f32) -> bool) -> Piece {
-        Piece::cut(&self.config, &self.grid, color, depth, moves)
+    /// Extracts the patch of a frame, with the classes of static objects where they are known.
+    pub fn extract(&self, dynamic: &DynamicConfig, source: &Source<'_>) -> KeyframePatch {
+        let Source { color, depth, moving, objects } = source;
+        let moves = |at, edge| moving.covers(depth, at, edge);
+        let patch = KeyframePatch::extract(&self.config, &self.grid, color, depth, moves);
+        let Some((ids, objects)) = self.class_ids.as_ref().zip(*objects) else { return patch };
+        let masks = ObjectMasks::segment(dynamic, objects, depth, moving);
+        let id = |at| masks.class_at(at).and_then(|class| ids.get(class).copied()).unwrap_or_default();
+        patch.with_classes(&self.grid, id)
     }
 
-    /// What classes are in pieces of this mapper, by their place in `names`, those of a detector: as in those of an earlier session. Of
-    /// more than 255 in all, the last are unknown.
-    pub fn name_classes(&mut self, names: &[String]) -> Vec<u8> {
+    /// Assigns numbers in the patches to the classes of a detector, by name: the same as in patches of an earlier session. Of more than
+    /// 255 in all, the last are unknown (0).
+    pub fn name_classes(&mut self, names: &[String]) {
+        if !self.config.classes {
+            return;
+        }
         let known = &mut self.class_names;
         let class = |name: &String| {
             let at = known.iter().position(|other| other == name).unwrap_or(known.len());
@@ -147,18 +179,18 @@ impl DenseMapper {
             }
             u8::try_from(at + 1).unwrap_or(0)
         };
-        names.iter().map(class).collect()
+        self.class_ids = Some(names.iter().map(class).collect());
     }
 
-    /// Hangs a piece on a keyframe, and brings the volume to where the map has all pieces now.
-    pub fn hang(&mut self, timestamp_ns: i64, tie: Tie, piece: Piece, map: &Map) {
-        self.ties.push(tie);
-        let poses = self.poses(map);
+    /// Inserts a patch with its pose relative to a keyframe, and moves all patches to where the map has them now.
+    pub fn insert(&mut self, timestamp_ns: i64, pose: KeyframeRelativePose, patch: KeyframePatch, map: &Map) {
+        self.poses.push(pose);
+        let poses = self.world_poses(map);
         let pose = poses.last().copied().flatten();
-        let bytes = piece.bytes();
-        if !self.keeper.follow(vec![(timestamp_ns, piece)], poses) {
-            self.ties.pop();
-            self.passed_over += 1;
+        let bytes = patch.bytes();
+        if !self.fusion.place(vec![(timestamp_ns, Arc::new(patch))], poses) {
+            self.poses.pop();
+            self.patches_skipped += 1;
             return;
         }
         self.bytes += bytes;
@@ -167,109 +199,77 @@ impl DenseMapper {
         }
     }
 
-    /// Pieces that came when the thread was busy, and were left out.
-    pub fn passed_over(&self) -> usize {
-        self.passed_over
+    /// Patches that came while the thread was busy, and were left out.
+    pub fn patches_skipped(&self) -> usize {
+        self.patches_skipped
     }
 
-    /// Number of pieces.
+    /// Number of patches.
     pub fn len(&self) -> usize {
-        self.ties.len()
+        self.poses.len()
     }
 
-    /// Whether there are no pieces.
-    pub fn is_empty(&self) -> bool {
-        self.ties.is_empty()
-    }
-
-    /// Where the map has the pieces now, world from camera, and the root of the submap that defines this world; `None` for those of a
-    /// submap that was given up.
-    fn places(&self, map: &Map) -> Vec<Option<(KeyFrameId, Pose)>> {
-        let place = |(keyframe, t_cam_reference): &Tie| {
-            let (root, t_reference_world) = (map.root(*keyframe)?, map.keyframe_pose(*keyframe)?);
-            Some((root, (t_cam_reference * t_reference_world).inverse()))
-        };
-        self.ties.iter().map(place).collect()
-    }
-
-    /// Where the map has the pieces of the submap that most of them are in, world from camera; `None` for the others.
-    fn poses(&self, map: &Map) -> Vec<Option<Pose>> {
-        let places = self.places(map);
-        let largest = largest(&places);
-        places.into_iter().map(|place| place.filter(|(root, _)| Some(*root) == largest).map(|(_, pose)| pose)).collect()
-    }
-
-    /// The volume as the map has the pieces now; waits for the thread, if there is one.
-    pub fn volume(&mut self, map: &Map) -> Volume {
-        let poses = self.poses(map);
-        match &mut self.keeper {
-            Keeper::Inline(store) => {
-                store.follow(&poses);
-                store.volume.settle();
-                store.volume.clone()
-            }
-            Keeper::Threaded { sender, .. } => {
-                let (reply, volume) = sync_channel(1);
-                let asked =
-                    sender.send(Order::Follow(Vec::new(), poses)).and_then(|()| sender.send(Order::Show(reply)));
-                asked.ok().and_then(|()| volume.recv().ok()).unwrap_or_else(|| Volume::new(&self.config))
-            }
-            Keeper::Gone => Volume::new(&self.config),
-        }
-    }
-
-    /// Bytes of memory that the pieces take.
+    /// Memory of the patches, bytes.
     pub fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// Forgets all: the map was begun anew.
-    pub fn clear(&mut self) {
-        self.ties.clear();
-        self.last = None;
-        self.bytes = 0;
-        match &mut self.keeper {
-            Keeper::Inline(store) => store.clear(),
-            Keeper::Threaded { sender, .. } => {
-                // A thread that has ended has nothing to forget.
-                let _ = sender.send(Order::Clear);
-            }
-            Keeper::Gone => {}
-        }
+    /// Poses of the patches in the map as it is now, world from camera, each with the root of its submap, which defines the world; `None`
+    /// for patches of a submap that was removed.
+    fn rooted_poses(&self, map: &Map) -> Vec<Option<(KeyFrameId, Pose)>> {
+        let place = |(keyframe, t_cam_reference): &KeyframeRelativePose| {
+            let (root, t_reference_world) = (map.root(*keyframe)?, map.keyframe_pose(*keyframe)?);
+            Some((root, (t_cam_reference * t_reference_world).inverse()))
+        };
+        self.poses.iter().map(place).collect()
     }
 
-    /// The pieces with their poses, for products and files. Waits for the thread, if there is one.
-    pub fn into_survey(self, map: &Map) -> Survey {
-        let places = self.places(map);
-        let largest = largest(&places);
-        let pieces = match self.keeper {
-            Keeper::Inline(store) => store.pieces,
-            Keeper::Threaded { sender, thread } => {
-                drop(sender);
-                // A panic was reported by its thread already.
-                thread.join().map(|store| store.pieces).unwrap_or_default()
-            }
-            Keeper::Gone => Vec::new(),
-        };
-        let (grid, class_names) = (self.grid, self.class_names);
-        let mut survey = Survey { pieces: Vec::new(), apart: Vec::new(), grid, class_names };
-        for (((keyframe, _), place), (timestamp_ns, piece)) in self.ties.iter().zip(places).zip(pieces) {
-            let Some(((root, t_world_cam), (keyframe, _))) = place.zip(map.standing(*keyframe)) else { continue };
-            let one = SurveyPiece { timestamp_ns, keyframe: keyframe.sequence, t_world_cam, piece };
+    /// Poses of the patches of the submap that has most of them, world from camera; `None` for the others.
+    fn world_poses(&self, map: &Map) -> Vec<Option<Pose>> {
+        let poses = self.rooted_poses(map);
+        let largest = largest(&poses);
+        poses.into_iter().map(|pose| pose.filter(|(root, _)| Some(*root) == largest).map(|(_, pose)| pose)).collect()
+    }
+
+    /// Returns the volume with the patches where the map has them now; waits for the thread, if there is one.
+    pub fn volume(&mut self, map: &Map) -> Volume {
+        let poses = self.world_poses(map);
+        self.fusion.volume(poses).unwrap_or_else(|| Volume::new(&self.config))
+    }
+
+    /// Removes all patches: the map was begun anew.
+    pub fn clear(&mut self) {
+        self.poses.clear();
+        self.last = None;
+        self.bytes = 0;
+        self.fusion.clear();
+    }
+
+    /// Returns the patches with their poses, for products and files; waits for the thread, if there is one.
+    pub fn snapshot(&mut self, map: &Map) -> DenseMap {
+        let poses = self.rooted_poses(map);
+        let largest = largest(&poses);
+        let (grid, class_names) = (self.grid.clone(), self.class_names.clone());
+        let mut dense_map = DenseMap { patches: Vec::new(), apart: Vec::new(), grid, class_names };
+        for (((keyframe, _), place), (timestamp_ns, patch)) in self.poses.iter().zip(poses).zip(self.fusion.patches()) {
+            let surviving = map.surviving_ancestor(*keyframe);
+            let Some(((root, t_world_cam), (keyframe, _))) = place.zip(surviving) else { continue };
+            let patch = Arc::unwrap_or_clone(patch);
+            let one = PlacedPatch { timestamp_ns, keyframe: keyframe.sequence, t_world_cam, patch };
             if Some(root) == largest {
-                survey.pieces.push(one);
+                dense_map.patches.push(one);
             } else {
-                survey.apart.push((survey.pieces.len() + survey.apart.len(), one));
+                dense_map.apart.push((dense_map.patches.len() + dense_map.apart.len(), one));
             }
         }
-        survey
+        dense_map
     }
 }
 
-/// The root of the submap that most pieces are in; of equals the one begun first.
-fn largest(places: &[Option<(KeyFrameId, Pose)>]) -> Option<KeyFrameId> {
+/// The root of the submap that most patches are in; of equals the one begun first.
+fn largest(poses: &[Option<(KeyFrameId, Pose)>]) -> Option<KeyFrameId> {
     let mut counts: Vec<(usize, KeyFrameId)> = Vec::new();
-    for (root, _) in places.iter().flatten() {
+    for (root, _) in poses.iter().flatten() {
         match counts.iter_mut().find(|(_, other)| other == root) {
             Some((count, _)) => *count += 1,
             None => counts.push((1, *root)),
@@ -278,58 +278,82 @@ fn largest(places: &[Option<(KeyFrameId, Pose)>]) -> Option<KeyFrameId> {
     counts.iter().rev().max_by_key(|(count, _)| *count).map(|(_, root)| *root)
 }
 
-impl Keeper {
-    /// Returns whether the pieces were taken.
-    fn follow(&mut self, pieces: Vec<(i64, Piece)>, poses: Vec<Option<Pose>>) -> bool {
+impl FusionOwner {
+    /// Returns whether the patches were taken.
+    fn place(&mut self, patches: Vec<TimedPatch>, poses: Vec<Option<Pose>>) -> bool {
         match self {
-            Self::Inline(store) => {
-                store.pieces.extend(pieces);
-                store.follow(&poses);
+            Self::Inline(fusion) => {
+                fusion.place(patches, &poses);
                 true
             }
-            Self::Threaded { sender, .. } => match sender.try_send(Order::Follow(pieces, poses)) {
-                Ok(()) => true,
-                Err(TrySendError::Full(_)) => false,
-                Err(TrySendError::Disconnected(_)) => {
-                    *self = Self::Gone;
-                    false
-                }
-            },
-            Self::Gone => false,
+            Self::Threaded(worker) => worker.try_send(Request::Place(patches, poses)).is_ok(),
         }
     }
-}
 
-impl Store {
-    /// Works until nobody gives orders any more.
-    fn obey(mut self, orders: &Receiver<Order>) -> Self {
-        for order in orders {
-            match order {
-                Order::Follow(pieces, poses) => {
-                    self.pieces.extend(pieces);
-                    self.follow(&poses);
+    fn volume(&mut self, poses: Vec<Option<Pose>>) -> Option<Volume> {
+        match self {
+            Self::Inline(fusion) => {
+                fusion.place(Vec::new(), &poses);
+                Some(fusion.settled_volume())
+            }
+            Self::Threaded(worker) => {
+                let sent = worker.send(Request::Place(Vec::new(), poses)) && worker.send(Request::Volume);
+                match sent.then(|| worker.wait())?? {
+                    Answer::Volume(volume) => Some(*volume),
+                    Answer::Patches(_) => None,
                 }
-                Order::Show(reply) => {
-                    self.volume.settle();
-                    // Whoever asked may have stopped waiting.
-                    let _ = reply.send(self.volume.clone());
-                }
-                Order::Clear => self.clear(),
             }
         }
-        self
     }
 
-    /// Brings the volume to where the pieces hang.
-    fn follow(&mut self, poses: &[Option<Pose>]) {
-        for (number, ((_, piece), pose)) in self.pieces.iter().zip(poses).enumerate() {
-            let pose = pose.map(|t_world_cam| self.up * t_world_cam);
-            self.volume.place(number, &self.grid, piece, pose.as_ref());
+    fn patches(&mut self) -> Vec<TimedPatch> {
+        match self {
+            Self::Inline(fusion) => fusion.patches.clone(),
+            Self::Threaded(worker) => match worker.send(Request::Patches).then(|| worker.wait()).flatten() {
+                Some(Answer::Patches(patches)) => patches,
+                _ => Vec::new(),
+            },
         }
     }
 
     fn clear(&mut self) {
-        self.pieces.clear();
+        match self {
+            Self::Inline(fusion) => fusion.clear(),
+            Self::Threaded(worker) => {
+                // A thread that has ended has nothing to remove.
+                worker.send(Request::Clear);
+            }
+        }
+    }
+}
+
+impl Fusion {
+    fn handle(&mut self, request: Request) -> Option<Answer> {
+        match request {
+            Request::Place(patches, poses) => self.place(patches, &poses),
+            Request::Volume => return Some(Answer::Volume(Box::new(self.settled_volume()))),
+            Request::Patches => return Some(Answer::Patches(self.patches.clone())),
+            Request::Clear => self.clear(),
+        }
+        None
+    }
+
+    /// Adds patches, and moves all patches to their poses.
+    fn place(&mut self, patches: Vec<TimedPatch>, poses: &[Option<Pose>]) {
+        self.patches.extend(patches);
+        for (number, ((_, patch), pose)) in self.patches.iter().zip(poses).enumerate() {
+            let pose = pose.map(|t_world_cam| self.up * t_world_cam);
+            self.volume.place(number, &self.grid, patch, pose.as_ref());
+        }
+    }
+
+    fn settled_volume(&mut self) -> Volume {
+        self.volume.settle();
+        self.volume.clone()
+    }
+
+    fn clear(&mut self) {
+        self.patches.clear();
         self.volume = Volume::new(self.volume.config());
     }
 }
@@ -341,14 +365,14 @@ mod tests {
     use crate::features::FrameFeatures;
 
     /// A map of three keyframes, 0.3 m apart, and one that stands alone.
-    fn map() -> (Map, Vec<Tie>) {
+    fn map() -> (Map, Vec<KeyframeRelativePose>) {
         let mut map = Map::default();
-        let tie = |k: i64| {
+        let relative_pose = |k: i64| {
             let id = map.insert_keyframe(k, Pose::translation(-0.3 * k as f64, 0.0, 0.0), FrameFeatures::default());
             (id, Pose::translation(0.0, 0.01, 0.0))
         };
-        let ties = (0..4).map(tie).collect::<Vec<_>>();
-        (map, ties)
+        let relative_poses = (0..4).map(relative_pose).collect::<Vec<_>>();
+        (map, relative_poses)
     }
 
     fn mapper(execution: Execution) -> DenseMapper {
@@ -357,19 +381,19 @@ mod tests {
 
     #[test]
     fn on_its_own_thread_it_makes_the_same_map() {
-        let (map, ties) = map();
+        let (map, relative_poses) = map();
         let mut volumes = Vec::new();
         for execution in [Execution::Inline, Execution::Threaded] {
             let mut mapper = mapper(execution);
-            let piece = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, Some(1.1));
+            let patch = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, Some(1.1));
             // One submap of one keyframe: the others have no parent either, so that the first is the largest.
             for k in 0..3 {
-                mapper.hang(k, ties[0], piece.clone(), &map);
+                mapper.insert(k, relative_poses[0], patch.clone(), &map);
                 // Nothing is passed over when the thread has time.
                 volumes.push(mapper.volume(&map));
             }
-            assert_eq!((mapper.len(), mapper.passed_over()), (3, 0));
-            assert_eq!(mapper.into_survey(&map).pieces.len(), 3);
+            assert_eq!((mapper.len(), mapper.patches_skipped()), (3, 0));
+            assert_eq!(mapper.snapshot(&map).patches.len(), 3);
         }
         let voxels = |volume: &Volume| volume.voxels().collect::<Vec<_>>();
         for k in 0..3 {
@@ -380,11 +404,11 @@ mod tests {
 
     #[test]
     fn a_keyframe_that_shows_the_same_as_the_last_piece_is_not_due() {
-        let (map, ties) = map();
+        let (map, relative_poses) = map();
         let mut mapper = mapper(Execution::Inline);
         let at = |x: f64, turn: f64| Pose::new(nalgebra::Vector3::new(x, -0.01, 0.0), nalgebra::Vector3::y() * turn);
         assert!(mapper.is_due(0, &at(0.0, 0.0)));
-        mapper.hang(0, ties[0], scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None), &map);
+        mapper.insert(0, relative_poses[0], scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None), &map);
         assert!(!mapper.is_due(100_000_000, &at(0.1, 0.05)));
         for (time_ns, pose) in [(600_000_000, at(0.0, 0.0)), (1, at(0.3, 0.0)), (1, at(0.0, 0.2))] {
             assert!(mapper.is_due(time_ns, &pose));
@@ -393,52 +417,56 @@ mod tests {
 
     #[test]
     fn pieces_of_another_submap_are_left_out_until_it_is_joined() {
-        let (map, ties) = map();
+        let (map, relative_poses) = map();
         let mut mapper = mapper(Execution::Inline);
-        let piece = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None);
-        for (k, tie) in [ties[0], ties[1], ties[1]].into_iter().enumerate() {
-            mapper.hang(k as i64, tie, piece.clone(), &map);
+        let patch = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None);
+        for (k, relative_pose) in [relative_poses[0], relative_poses[1], relative_poses[1]].into_iter().enumerate() {
+            mapper.insert(k as i64, relative_pose, patch.clone(), &map);
         }
-        let survey = mapper.into_survey(&map);
-        assert_eq!(survey.pieces.iter().map(|one| one.timestamp_ns).collect::<Vec<_>>(), [1, 2]);
+        let dense_map = mapper.snapshot(&map);
+        assert_eq!(dense_map.patches.iter().map(|one| one.timestamp_ns).collect::<Vec<_>>(), [1, 2]);
         // It hangs where its keyframe is, seen from where it was.
-        let t = survey.pieces[0].t_world_cam.translation.vector;
+        let t = dense_map.patches[0].t_world_cam.translation.vector;
         assert!((t - nalgebra::Vector3::new(0.3, -0.01, 0.0)).norm() < 1e-9, "{t}");
-        assert_eq!(survey.apart.iter().map(|(at, one)| (*at, one.keyframe)).collect::<Vec<_>>(), [(0, 0)]);
+        assert_eq!(dense_map.apart.iter().map(|(at, one)| (*at, one.keyframe)).collect::<Vec<_>>(), [(0, 0)]);
     }
 
     #[test]
     fn pieces_of_an_earlier_session_follow_its_map_in_the_next_one() {
-        let (mut map, ties) = map();
-        let piece = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None);
+        let (mut map, relative_poses) = map();
+        let patch = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None);
         for execution in [Execution::Inline, Execution::Threaded] {
             let mut first = mapper(execution);
-            for (k, tie) in [ties[0], ties[1], ties[0], ties[1], ties[1]].into_iter().enumerate() {
-                first.hang(k as i64, tie, piece.clone(), &map);
+            for (k, relative_pose) in
+                [relative_poses[0], relative_poses[1], relative_poses[0], relative_poses[1], relative_poses[1]]
+                    .into_iter()
+                    .enumerate()
+            {
+                first.insert(k as i64, relative_pose, patch.clone(), &map);
                 first.volume(&map);
             }
-            let survey = first.into_survey(&map);
-            assert_eq!((survey.pieces.len(), survey.apart.len()), (3, 2));
+            let dense_map = first.snapshot(&map);
+            assert_eq!((dense_map.patches.len(), dense_map.apart.len()), (3, 2));
             // Two more of the other submap make it the larger one.
-            let mut second = mapper(execution).with_pieces(survey.clone(), &map).unwrap();
-            second.hang(10, ties[0], piece.clone(), &map);
+            let mut second = mapper(execution).with_earlier(dense_map.clone(), &map).unwrap();
+            second.insert(10, relative_poses[0], patch.clone(), &map);
             second.volume(&map);
-            second.hang(11, ties[0], piece.clone(), &map);
-            let after = second.into_survey(&map);
-            assert_eq!(after.pieces.iter().map(|one| one.timestamp_ns).collect::<Vec<_>>(), [0, 2, 10, 11]);
+            second.insert(11, relative_poses[0], patch.clone(), &map);
+            let after = second.snapshot(&map);
+            assert_eq!(after.patches.iter().map(|one| one.timestamp_ns).collect::<Vec<_>>(), [0, 2, 10, 11]);
             assert_eq!(
                 after.apart.iter().map(|(at, one)| (*at, one.timestamp_ns)).collect::<Vec<_>>(),
                 [(1, 1), (3, 3), (4, 4)]
             );
             // A correction moves what was loaded.
-            let (moved, by) = (mapper(execution).with_pieces(survey.clone(), &map).unwrap(), 0.5);
-            let pose = map.keyframe(ties[1].0).unwrap().t_cam_world;
-            map.set_pose(ties[1].0, pose * Pose::translation(0.0, -by, 0.0));
-            for (before, after) in survey.pieces.iter().zip(&moved.into_survey(&map).pieces) {
+            let (mut moved, by) = (mapper(execution).with_earlier(dense_map.clone(), &map).unwrap(), 0.5);
+            let pose = map.keyframe(relative_poses[1].0).unwrap().t_cam_world;
+            map.set_pose(relative_poses[1].0, pose * Pose::translation(0.0, -by, 0.0));
+            for (before, after) in dense_map.patches.iter().zip(&moved.snapshot(&map).patches) {
                 let step = after.t_world_cam.translation.vector - before.t_world_cam.translation.vector;
                 assert!((step - nalgebra::Vector3::y() * by).norm() < 1e-9, "{step}");
             }
-            map.set_pose(ties[1].0, pose);
+            map.set_pose(relative_poses[1].0, pose);
         }
     }
 
@@ -447,25 +475,29 @@ mod tests {
         let (map, _) = map();
         let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let mut first = mapper(Execution::Inline);
-        assert_eq!(first.name_classes(&names(&["person", "chair"])), [1, 2]);
-        let mut second = mapper(Execution::Inline).with_pieces(first.into_survey(&map), &map).unwrap();
-        assert_eq!(second.name_classes(&names(&["chair", "tv", "person"])), [2, 3, 1]);
-        assert_eq!(second.into_survey(&map).class_names, ["person", "chair", "tv"]);
+        first.name_classes(&names(&["person", "chair"]));
+        assert_eq!(first.class_ids, Some(vec![1, 2]));
+        let mut second = mapper(Execution::Inline).with_earlier(first.snapshot(&map), &map).unwrap();
+        second.name_classes(&names(&["chair", "tv", "person"]));
+        assert_eq!(second.class_ids, Some(vec![2, 3, 1]));
+        assert_eq!(second.snapshot(&map).class_names, ["person", "chair", "tv"]);
         let many: Vec<String> = (0..300).map(|class| class.to_string()).collect();
-        assert_eq!(mapper(Execution::Inline).name_classes(&many)[253..257], [254, 255, 0, 0]);
+        let mut third = mapper(Execution::Inline);
+        third.name_classes(&many);
+        assert_eq!(third.class_ids.unwrap()[253..257], [254, 255, 0, 0]);
     }
 
     #[test]
     fn pieces_of_other_cells_or_of_another_map_are_refused() {
-        let (map, ties) = map();
+        let (map, relative_poses) = map();
         let mut first = mapper(Execution::Inline);
-        first.hang(0, ties[2], scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None), &map);
-        let survey = first.into_survey(&map);
-        let error = mapper(Execution::Inline).with_pieces(survey.clone(), &Map::default()).err().unwrap();
+        first.insert(0, relative_poses[2], scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None), &map);
+        let dense_map = first.snapshot(&map);
+        let error = mapper(Execution::Inline).with_earlier(dense_map.clone(), &Map::default()).err().unwrap();
         assert!(error.to_string().contains("keyframe 2"), "{error}");
         let coarse = DenseConfig { stride_px: 4, ..Default::default() };
         let coarse = DenseMapper::new(&coarse, &scene::camera(), Execution::Inline).unwrap();
-        let error = coarse.with_pieces(survey, &map).err().unwrap().to_string();
+        let error = coarse.with_earlier(dense_map, &map).err().unwrap().to_string();
         assert!(error.contains("cells of 2 px") && error.contains("dense.stride_px = 2"), "{error}");
     }
 }

@@ -1,8 +1,8 @@
 //! A mesh of the surfaces: a truncated signed distance field (Curless and Levoy, SIGGRAPH 1996; KinectFusion, ISMAR 2011, section 3.3),
 //! and its zero level by surface nets (Gibson, MICCAI 1998).
 //!
-//! In: a survey with its volume. Out: triangles with colour. The field is sampled in the middles of voxels and is the mean over all
-//! pieces; surfaces that the volume does not have as occupied, such as those of somebody who has left, are left out.
+//! In: a dense_map with its volume. Out: triangles with colour. The field is sampled in the middles of voxels and is the mean over all
+//! patches; surfaces that the volume does not have as occupied, such as those of somebody who has left, are left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::dense::cloud::neighbours;
 use crate::dense::voxels::{Block, VOXELS, Voxel, block_of, center_m, place_of, voxel_in};
-use crate::dense::{Survey, Volume};
+use crate::dense::{DenseMap, Volume};
 
 /// Triangles and their corners.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,13 +34,13 @@ struct Sample {
 
 type Field = BTreeMap<Block, Vec<Sample>>;
 
-/// The mesh of a survey. `told` hears how many blocks, of how many, are done.
-pub fn mesh(survey: &Survey, volume: &Volume, mut told: impl FnMut(usize, usize)) -> Mesh {
+/// The mesh of a dense_map. `told` hears how many blocks, of how many, are done.
+pub fn mesh(dense_map: &DenseMap, volume: &Volume, mut told: impl FnMut(usize, usize)) -> Mesh {
     let near = near_surfaces(volume);
     let mut field = Field::new();
     for (done, &block) in near.iter().enumerate() {
         told(done, near.len());
-        field.insert(block, sample(survey, volume, block));
+        field.insert(block, sample(dense_map, volume, block));
     }
     surface(volume, &field)
 }
@@ -63,26 +63,26 @@ fn near_surfaces(volume: &Volume) -> BTreeSet<Block> {
 }
 
 /// The field in a block.
-fn sample(survey: &Survey, volume: &Volume, block: Block) -> Vec<Sample> {
+fn sample(dense_map: &DenseMap, volume: &Volume, block: Block) -> Vec<Sample> {
     let config = volume.config();
     let truncation_m = config.truncation_voxels * config.resolution_m;
     let around = (0..27).map(|i| [block[0] + i % 3 - 1, block[1] + i / 3 % 3 - 1, block[2] + i / 9 - 1]);
     let seen_by: BTreeSet<usize> = around.flat_map(|block| volume.seen_by(block)).collect();
     let mut samples = vec![Sample::default(); VOXELS];
     for number in seen_by {
-        let (Some(one), Some(pose)) = (survey.pieces.get(number), volume.pose(number)) else { continue };
+        let (Some(one), Some(pose)) = (dense_map.patches.get(number), volume.pose(number)) else { continue };
         let t_cam_map: Isometry3<f32> = pose.inverse().cast();
         for (place, sample) in samples.iter_mut().enumerate() {
             let p = t_cam_map * center_m(voxel_in(block, place), config.resolution_m);
-            let Some([column, row]) = survey.grid.project(&p) else { continue };
-            let cell = (row + 0.5) as usize * survey.grid.columns() + (column + 0.5) as usize;
-            let Some(depth_m) = one.piece.surface_m(cell).filter(|z| *z <= config.max_range_m) else { continue };
+            let Some([column, row]) = dense_map.grid.project(&p) else { continue };
+            let cell = (row + 0.5) as usize * dense_map.grid.columns() + (column + 0.5) as usize;
+            let Some(depth_m) = one.patch.surface_m(cell).filter(|z| *z <= config.max_range_m) else { continue };
             // Along the ray, not along the axis.
             let distance = (depth_m - p.z) * p.coords.norm() / p.z / truncation_m;
             if distance > -1.0 {
                 // Noise grows with the square of the depth.
                 let weight = 1.0 / (1.0 + depth_m * depth_m);
-                sample.add(distance.min(1.0), weight, one.piece.color(cell));
+                sample.add(distance.min(1.0), weight, one.patch.color(cell));
             }
         }
     }
@@ -206,10 +206,10 @@ mod tests {
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
         let pose = |k: i64| Pose::translation(0.02 * k as f64, 0.0, 0.013 * k as f64);
         // Seen from three places.
-        let piece = |k: i64| (pose(k), scene::wall(&grid, 2.0 - 0.013 * k as f32, None));
-        let survey = Survey::of_poses(grid.clone(), (0..3).map(piece));
-        let volume = survey.volume(&config, &UnitQuaternion::identity(), |_| {});
-        let mesh = mesh(&survey, &volume, |_, _| {});
+        let patch = |k: i64| (pose(k), scene::wall(&grid, 2.0 - 0.013 * k as f32, None));
+        let dense_map = DenseMap::of_poses(grid.clone(), (0..3).map(patch));
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let mesh = mesh(&dense_map, &volume, |_, _| {});
         assert!(mesh.vertices_m.iter().all(|p| (p[2] - 2.0).abs() < 0.004), "on the wall");
         assert!(mesh.colors.iter().all(|color| *color == [120, 130, 140]));
         let mut area = 0.0;

@@ -1,39 +1,45 @@
 //! Maps that people use: occupancy, clouds, grids, meshes, and the view without people.
 //!
 //! ```text
-//! frame ─► piece ──hangs on its keyframe──► mapper ─► volume      occupied, free, unknown; follows every correction
+//! frame ─► patch ──hangs on its keyframe──► mapper ─► volume      occupied, free, unknown; follows every correction
 //!          depth and colour without          │
-//!          edges; what moves is marked       └──► survey ─► cloud, grid, mesh, classes, background
+//!          edges; what moves is marked       └──► dense_map ─► cloud, grid, mesh, classes, background
 //! ```
 //!
-//! Nothing that moves makes a surface: the dynamic filter's decision is cut into the piece. What it missed is taken back by the views
+//! Nothing that moves makes a surface: the dynamic filter's decision is cut into the patch. What it missed is taken back by the views
 //! that come after and see through it.
 
 pub mod background;
-mod beside;
 pub mod classes;
 pub mod cloud;
+pub mod gravity;
 pub mod grid;
+pub mod keyframe_patch;
 mod mapper;
+#[cfg(test)]
+mod memory_tests;
 pub mod mesh;
-pub mod persist;
-pub mod piece;
+mod object_masks;
+mod persist;
 #[cfg(test)]
 mod scene;
+mod static_recovery;
 mod trace;
-pub mod up;
+mod view;
 mod volume;
 pub mod voxels;
 
 pub use crate::config::DenseConfig;
-pub use mapper::DenseMapper;
-pub use piece::{CellGrid, Piece};
+pub use keyframe_patch::{CellGrid, KeyframePatch};
+pub(crate) use mapper::{DenseMapper, Source};
+pub use view::DenseView;
 pub use volume::{KnownVoxel, Volume};
 
 use nalgebra::UnitQuaternion;
 
 use crate::config::ConfigError;
 use crate::geometry::Pose;
+use crate::map::persist::MapError;
 
 /// Why no dense map can be made.
 #[derive(Debug, thiserror::Error)]
@@ -43,7 +49,7 @@ pub enum DenseError {
     Config(#[from] ConfigError),
     /// Pieces of an earlier session on other cells.
     #[error(
-        "its pieces have cells of {found} px of a camera of {width} × {height}, this session has cells of {wanted} px: take the same camera, \
+        "its patches have cells of {found} px of a camera of {width} × {height}, this session has cells of {wanted} px: take the same camera, \
          and dense.stride_px = {found}"
     )]
     Cells {
@@ -57,7 +63,7 @@ pub enum DenseError {
         height: usize,
     },
     /// Pieces of another map.
-    #[error("a piece hangs on keyframe {0}, which the map does not have: the pieces are of another map")]
+    #[error("a patch hangs on keyframe {0}, which the map does not have: the patches are of another map")]
     Keyframe(u64),
     /// More memory than is allowed.
     #[error(
@@ -76,6 +82,9 @@ pub enum DenseError {
         /// Side of a voxel with which it is less, m.
         fits_m: f32,
     },
+    /// The system was built without a dense map.
+    #[error("the system was built without a dense map: give the builder a dense configuration (`SlamBuilder::dense`)")]
+    Disabled,
     /// A thread could not be started.
     #[error("the thread of the dense map could not be started: {0}; raise the limit of threads of this user")]
     Thread(#[from] std::io::Error),
@@ -83,21 +92,21 @@ pub enum DenseError {
 
 /// Pieces in their places: what all products are made of.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Survey {
-    /// The cells of the pieces.
+pub struct DenseMap {
+    /// The cells of the patches.
     pub grid: CellGrid,
     /// In the order in which they were cut.
-    pub pieces: Vec<SurveyPiece>,
-    /// Those of submaps that are not joined with that of most pieces, each in its own world, with its place among all pieces. No product
+    pub patches: Vec<PlacedPatch>,
+    /// Those of submaps that are not joined with that of most patches, each in its own world, with its place among all patches. No product
     /// shows them; they come in when their submap is joined in a later session.
-    pub apart: Vec<(usize, SurveyPiece)>,
-    /// Names of the classes that cells may have, from class 1 on; none if no detector looked for things.
+    pub apart: Vec<(usize, PlacedPatch)>,
+    /// Names of the classes that cells may have, from class 1 on; none if no detector looked for static_objects.
     pub class_names: Vec<String>,
 }
 
-/// A piece in its place.
+/// A patch in its place.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SurveyPiece {
+pub struct PlacedPatch {
     /// Time of the frame, ns.
     pub timestamp_ns: i64,
     /// Sequence number of the keyframe it hangs on.
@@ -105,32 +114,48 @@ pub struct SurveyPiece {
     /// World from camera.
     pub t_world_cam: Pose,
     /// Depth and colour.
-    pub piece: Piece,
+    pub patch: KeyframePatch,
 }
 
-impl Survey {
-    /// A survey of pieces whose places, world from camera, no map has to say; numbered in the order given.
-    pub fn of_poses(grid: CellGrid, pieces: impl IntoIterator<Item = (Pose, Piece)>) -> Self {
-        let number = |(number, (t_world_cam, piece))| SurveyPiece {
+impl DenseMap {
+    /// Returns the map as bytes, for [`DenseMap::from_bytes`].
+    ///
+    /// # Errors
+    /// If it cannot be written, which would be a fault of this program.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, MapError> {
+        persist::encode(self)
+    }
+
+    /// Reads the dense map in `bytes` and checks it: a file of its own, or the first part of a saved map.
+    ///
+    /// # Errors
+    /// If the bytes are no dense map, of another version, cut, altered, or contradict themselves; if they are a map without a dense one.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, MapError> {
+        persist::decode(bytes)
+    }
+
+    /// A dense_map of patches whose places, world from camera, no map has to say; numbered in the order given.
+    pub fn of_poses(grid: CellGrid, patches: impl IntoIterator<Item = (Pose, KeyframePatch)>) -> Self {
+        let number = |(number, (t_world_cam, patch))| PlacedPatch {
             timestamp_ns: number as i64,
             keyframe: number as u64,
             t_world_cam,
-            piece,
+            patch,
         };
         Self {
-            pieces: pieces.into_iter().enumerate().map(number).collect(),
+            patches: patches.into_iter().enumerate().map(number).collect(),
             apart: Vec::new(),
             grid,
             class_names: Vec::new(),
         }
     }
 
-    /// Bytes of memory that its pieces take.
+    /// Bytes of memory that its patches take.
     pub fn bytes(&self) -> usize {
-        self.pieces.iter().map(|one| one.piece.bytes()).sum()
+        self.patches.iter().map(|one| one.patch.bytes()).sum()
     }
 
-    /// The volume of all pieces in a world turned by `turn`. `told` hears how many pieces are done.
+    /// The volume of all patches in a world turned by `turn`. `told` hears how many patches are done.
     pub fn volume(&self, config: &DenseConfig, turn: &UnitQuaternion<f64>, mut told: impl FnMut(usize)) -> Volume {
         self.fill(config, turn, |number, _| {
             told(number);
@@ -153,15 +178,15 @@ impl Survey {
             told(number);
             let bytes = volume.bytes();
             if check_memory(config, "the map", bytes).is_err() {
-                // As much again for each piece that is still to come.
-                refused = check_memory(config, "the map", bytes / number.max(1) * self.pieces.len()).err();
+                // As much again for each patch that is still to come.
+                refused = check_memory(config, "the map", bytes / number.max(1) * self.patches.len()).err();
             }
             refused.is_none()
         });
         refused.map_or(Ok(volume), Err)
     }
 
-    /// Enters pieces for as long as `goes_on`, which is asked before each, says so.
+    /// Enters patches for as long as `goes_on`, which is asked before each, says so.
     fn fill(
         &self,
         config: &DenseConfig,
@@ -169,13 +194,13 @@ impl Survey {
         mut goes_on: impl FnMut(usize, &Volume) -> bool,
     ) -> Volume {
         let mut volume = Volume::new(config);
-        for (number, one) in self.pieces.iter().enumerate() {
+        for (number, one) in self.patches.iter().enumerate() {
             if !goes_on(number, &volume) {
                 return volume;
             }
-            volume.place(number, &self.grid, &one.piece, Some(&(turn * one.t_world_cam)));
+            volume.place(number, &self.grid, &one.patch, Some(&(turn * one.t_world_cam)));
         }
-        goes_on(self.pieces.len(), &volume);
+        goes_on(self.patches.len(), &volume);
         volume.settle();
         volume
     }
@@ -205,14 +230,15 @@ mod tests {
         let mut config = DenseConfig { resolution_m: 0.01, max_memory_mb: 2, ..Default::default() };
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
         let pose = |k: u32| Pose::translation(0.0, 0.0, f64::from(k) * 0.4);
-        let survey = Survey::of_poses(grid.clone(), (0..6).map(|k| (pose(k), scene::wall(&grid, 3.01, Some(1.5)))));
+        let dense_map =
+            DenseMap::of_poses(grid.clone(), (0..6).map(|k| (pose(k), scene::wall(&grid, 3.01, Some(1.5)))));
         let turn = UnitQuaternion::identity();
-        let error = survey.volume_within(&config, &turn, |_| {}).err().unwrap();
+        let error = dense_map.volume_within(&config, &turn, |_| {}).err().unwrap();
         let DenseError::Memory { fits_m, allowed_mb: 2, .. } = error else { panic!("{error}") };
         assert!(error.to_string().contains("at 0.01 m the map would take"), "{error}");
         config.resolution_m = fits_m;
-        let volume = survey.volume_within(&config, &turn, |_| {}).unwrap();
+        let volume = dense_map.volume_within(&config, &turn, |_| {}).unwrap();
         assert!(volume.bytes() <= 2_000_000);
-        assert!(volume.voxels().eq(survey.volume(&config, &turn, |_| {}).voxels()));
+        assert!(volume.voxels().eq(dense_map.volume(&config, &turn, |_| {}).voxels()));
     }
 }

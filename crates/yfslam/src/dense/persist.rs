@@ -1,67 +1,67 @@
 //! Pieces as bytes: what `yfslam run --dense` leaves behind.
 //!
-//! In: a survey. Out: bytes, and back. They are a file of their own, or stand in a saved map before what [`crate::map::persist`] writes,
+//! In: a dense_map. Out: bytes, and back. They are a file of their own, or stand in a saved map before what [`crate::map::persist`] writes,
 //! whose keyframes they name. Depth and colour are kept as differences from the cell to the left, which pack better.
 
 use serde::{Deserialize, Serialize};
 
-use crate::dense::piece::{CellGrid, Piece};
-use crate::dense::{Survey, SurveyPiece};
+use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
+use crate::dense::{DenseMap, PlacedPatch};
+use crate::map::container::{ContainerError, DENSE_MAP, MAP};
 use crate::map::persist::{CameraRecord, pose_of, pose_record};
-use crate::packed::{MAP, PIECES, PackedError};
 
 #[derive(Serialize, Deserialize)]
 struct Records {
     camera: CameraRecord,
     stride_px: u32,
-    /// Of those that pieces have, from class 1 on.
+    /// Of those that patches have, from class 1 on.
     class_names: Vec<String>,
-    pieces: Vec<PieceRecord>,
-    /// With their place among all pieces.
-    apart: Vec<(u32, PieceRecord)>,
+    patches: Vec<PatchRecord>,
+    /// With their place among all patches.
+    apart: Vec<(u32, PatchRecord)>,
 }
 
 #[derive(Serialize, Deserialize)]
-struct PieceRecord {
+struct PatchRecord {
     timestamp_ns: i64,
     keyframe: u64,
     /// `t_world_cam`: x y z, quaternion x y z w.
     pose: [f64; 7],
     depth: Vec<i16>,
     color: Vec<u8>,
-    /// As it is in the piece: none, or one for each cell.
+    /// As it is in the patch: none, or one for each cell.
     class: Vec<u8>,
 }
 
-/// The survey as bytes.
+/// The dense_map as bytes.
 ///
 /// # Errors
 /// If it cannot be written, which would be a fault of this program.
-pub fn encode(survey: &Survey) -> Result<Vec<u8>, PackedError> {
-    PIECES.pack(&Records {
-        camera: CameraRecord::of(survey.grid.camera()),
-        stride_px: survey.grid.stride_px() as u32,
-        class_names: survey.class_names.clone(),
-        pieces: survey.pieces.iter().map(PieceRecord::of).collect(),
-        apart: survey.apart.iter().map(|(at, one)| (*at as u32, PieceRecord::of(one))).collect(),
+pub(super) fn encode(dense_map: &DenseMap) -> Result<Vec<u8>, ContainerError> {
+    DENSE_MAP.pack(&Records {
+        camera: CameraRecord::of(dense_map.grid.camera()),
+        stride_px: dense_map.grid.stride_px() as u32,
+        class_names: dense_map.class_names.clone(),
+        patches: dense_map.patches.iter().map(PatchRecord::of).collect(),
+        apart: dense_map.apart.iter().map(|(at, one)| (*at as u32, PatchRecord::of(one))).collect(),
     })
 }
 
-/// The survey in `bytes`, checked: a file of its own, or that of a saved map.
+/// The dense_map in `bytes`, checked: a file of its own, or that of a saved map.
 ///
 /// # Errors
-/// If the bytes are no survey, of another version, cut, altered, or contradict themselves; if they are a map without one.
-pub fn decode(bytes: &[u8]) -> Result<Survey, PackedError> {
+/// If the bytes are no dense_map, of another version, cut, altered, or contradict themselves; if they are a map without one.
+pub fn decode(bytes: &[u8]) -> Result<DenseMap, ContainerError> {
     if MAP.begins(bytes) {
-        return Err(PackedError::NoPieces);
+        return Err(ContainerError::NoPieces);
     }
-    let (packed, map) = PIECES.split(bytes)?;
+    let (packed, map) = DENSE_MAP.split(bytes)?;
     if !map.is_empty() {
         MAP.whole(map)?;
     }
-    let Records { camera, stride_px, class_names, pieces, apart } = packed.unpack()?;
+    let Records { camera, stride_px, class_names, patches, apart } = packed.unpack()?;
     let camera = camera.into_camera();
-    let wrong = |what: String| Err(PackedError::Records(what));
+    let wrong = |what: String| Err(ContainerError::Records(what));
     if stride_px == 0 || stride_px as usize > camera.width.min(camera.height) {
         return wrong(format!("cells of {stride_px} px in a picture of {} × {}", camera.width, camera.height));
     }
@@ -70,16 +70,16 @@ pub fn decode(bytes: &[u8]) -> Result<Survey, PackedError> {
         return wrong(format!("a camera of {} × {} px", camera.width, camera.height));
     }
     let grid = CellGrid::new(&camera, stride_px as usize);
-    let piece = |record: PieceRecord| record.into_piece(&grid, class_names.len());
-    let pieces = pieces.into_iter().map(piece).collect::<Result<_, _>>()?;
-    let apart = apart.into_iter().map(|(at, record)| Ok((at as usize, piece(record)?)));
+    let patch = |record: PatchRecord| record.into_patch(&grid, class_names.len());
+    let patches = patches.into_iter().map(patch).collect::<Result<_, _>>()?;
+    let apart = apart.into_iter().map(|(at, record)| Ok((at as usize, patch(record)?)));
     let apart = apart.collect::<Result<_, _>>()?;
-    Ok(Survey { pieces, apart, grid, class_names })
+    Ok(DenseMap { patches, apart, grid, class_names })
 }
 
-impl PieceRecord {
-    fn of(one: &SurveyPiece) -> Self {
-        let Piece { depth, color, class } = &one.piece;
+impl PatchRecord {
+    fn of(one: &PlacedPatch) -> Self {
+        let KeyframePatch { depth, color, class } = &one.patch;
         let (mut last_depth, mut last_color) = (0u16, [0u8; 3]);
         Self {
             timestamp_ns: one.timestamp_ns,
@@ -97,27 +97,27 @@ impl PieceRecord {
         }
     }
 
-    fn into_piece(self, grid: &CellGrid, classes: usize) -> Result<SurveyPiece, PackedError> {
+    fn into_patch(self, grid: &CellGrid, classes: usize) -> Result<PlacedPatch, ContainerError> {
         let cells = grid.columns() * grid.rows();
         if self.depth.len() != cells || self.color.len() != 3 * cells {
             let (depth, color) = (self.depth.len(), self.color.len());
-            return Err(PackedError::Records(format!(
-                "the piece of keyframe {} has {depth} depths and {color} colour values for {cells} cells",
+            return Err(ContainerError::Records(format!(
+                "the patch of keyframe {} has {depth} depths and {color} colour values for {cells} cells",
                 self.keyframe
             )));
         }
         let unnamed = self.class.iter().find(|class| usize::from(**class) > classes);
         if let Some(class) = unnamed.filter(|_| self.class.len() == cells) {
-            return Err(PackedError::Records(format!("class {class} has no name: there are {classes}")));
+            return Err(ContainerError::Records(format!("class {class} has no name: there are {classes}")));
         }
         if self.class.len() != cells && !self.class.is_empty() {
             let (found, keyframe) = (self.class.len(), self.keyframe);
-            return Err(PackedError::Records(format!("{found} classes for {cells} cells of keyframe {keyframe}")));
+            return Err(ContainerError::Records(format!("{found} classes for {cells} cells of keyframe {keyframe}")));
         }
         let Some(t_world_cam) = pose_of(&self.pose) else {
             let Self { keyframe, pose, .. } = self;
-            return Err(PackedError::Records(format!(
-                "the pose of the piece of keyframe {keyframe} is none: {pose:?}"
+            return Err(ContainerError::Records(format!(
+                "the pose of the patch of keyframe {keyframe} is none: {pose:?}"
             )));
         };
         let (mut depth, mut color) = (0u16, [0u8; 3]);
@@ -132,7 +132,7 @@ impl PieceRecord {
         });
         let color = colors.collect();
         let Self { timestamp_ns, keyframe, class, .. } = self;
-        Ok(SurveyPiece { timestamp_ns, keyframe, t_world_cam, piece: Piece { depth, color, class } })
+        Ok(PlacedPatch { timestamp_ns, keyframe, t_world_cam, patch: KeyframePatch { depth, color, class } })
     }
 }
 
@@ -146,20 +146,20 @@ mod tests {
     use crate::map::Map;
     use crate::map::scene::Scene;
 
-    fn survey() -> Survey {
+    fn dense_map() -> DenseMap {
         let grid = CellGrid::new(&scene::camera(), 4);
-        let piece = |number: i64| SurveyPiece {
+        let patch = |number: i64| PlacedPatch {
             timestamp_ns: number * 1_000_000_007,
             keyframe: 2 * number as u64,
             t_world_cam: Isometry3::new(Vector3::new(0.1 * number as f64, 0.0, 0.3), Vector3::y() * 0.2),
-            piece: scene::wall(&grid, 2.5, Some(1.0 + 0.1 * number as f32)),
+            patch: scene::wall(&grid, 2.5, Some(1.0 + 0.1 * number as f32)),
         };
-        let mut pieces: Vec<_> = (0..3).map(piece).collect();
-        pieces[1].piece.color.iter_mut().enumerate().for_each(|(i, rgb)| *rgb = [i as u8, (i * 7) as u8, 255]);
-        pieces[2].piece.depth.iter_mut().for_each(|d| *d |= 1 << 15);
-        pieces[0].piece = pieces[0].piece.clone().with_classes(&grid, |[x, _]| u8::from(x < 20.0) * 2);
+        let mut patches: Vec<_> = (0..3).map(patch).collect();
+        patches[1].patch.color.iter_mut().enumerate().for_each(|(i, rgb)| *rgb = [i as u8, (i * 7) as u8, 255]);
+        patches[2].patch.depth.iter_mut().for_each(|d| *d |= 1 << 15);
+        patches[0].patch = patches[0].patch.clone().with_classes(&grid, |[x, _]| u8::from(x < 20.0) * 2);
         let class_names = vec!["chair".to_owned(), "tv".to_owned()];
-        Survey { pieces, apart: vec![(1, piece(7))], grid, class_names }
+        DenseMap { patches, apart: vec![(1, patch(7))], grid, class_names }
     }
 
     /// A map of one keyframe.
@@ -171,38 +171,38 @@ mod tests {
 
     #[test]
     fn a_survey_read_back_is_the_one_that_was_written() {
-        let survey = survey();
-        let read = decode(&encode(&survey).unwrap()).unwrap();
-        assert_eq!(read, survey);
+        let dense_map = dense_map();
+        let read = decode(&encode(&dense_map).unwrap()).unwrap();
+        assert_eq!(read, dense_map);
     }
 
     #[test]
     fn a_class_without_a_name_is_refused() {
-        let mut survey = survey();
-        survey.class_names.truncate(1);
-        let error = decode(&encode(&survey).unwrap()).unwrap_err().to_string();
+        let mut dense_map = dense_map();
+        dense_map.class_names.truncate(1);
+        let error = decode(&encode(&dense_map).unwrap()).unwrap_err().to_string();
         assert!(error.contains("class 2 has no name"), "{error}");
     }
 
     #[test]
     fn a_saved_map_holds_both_what_finds_a_camera_and_what_products_are_made_of() {
-        let (pieces, map) = (encode(&survey()).unwrap(), map());
-        let both = [pieces.clone(), map.clone()].concat();
-        assert_eq!(decode(&both).unwrap(), survey());
+        let (patches, map) = (encode(&dense_map()).unwrap(), map());
+        let both = [patches.clone(), map.clone()].concat();
+        assert_eq!(decode(&both).unwrap(), dense_map());
         assert_eq!(crate::map::persist::decode(&both).unwrap().map.keyframe_count(), 1);
-        assert_eq!(decode(&map).unwrap_err(), PackedError::NoPieces);
-        let error = crate::map::persist::decode(&pieces).unwrap_err();
-        assert_eq!(error, PackedError::Foreign(MAP.magic), "pieces alone find no camera");
+        assert_eq!(decode(&map).unwrap_err(), ContainerError::NoPieces);
+        let error = crate::map::persist::decode(&patches).unwrap_err();
+        assert_eq!(error, ContainerError::Foreign(MAP.magic), "patches alone find no camera");
     }
 
     #[test]
     fn no_cut_and_no_flipped_bit_goes_unnoticed() {
-        let pieces = encode(&survey()).unwrap();
-        let both = [pieces.clone(), map()].concat();
-        for length in (0..both.len()).step_by(97).filter(|length| *length != pieces.len()) {
+        let patches = encode(&dense_map()).unwrap();
+        let both = [patches.clone(), map()].concat();
+        for length in (0..both.len()).step_by(97).filter(|length| *length != patches.len()) {
             assert!(decode(&both[..length]).is_err(), "cut to {length} bytes");
         }
-        for length in (0..both.len()).step_by(97).chain([pieces.len()]) {
+        for length in (0..both.len()).step_by(97).chain([patches.len()]) {
             assert!(crate::map::persist::decode(&both[..length]).is_err(), "cut to {length} bytes");
         }
         for bit in (0..8 * both.len()).step_by(101) {
@@ -215,8 +215,8 @@ mod tests {
 
     #[test]
     fn pieces_of_an_earlier_version_are_refused_by_its_number() {
-        let mut bytes = encode(&survey()).unwrap();
-        bytes[PIECES.magic.len()] = 1;
+        let mut bytes = encode(&dense_map()).unwrap();
+        bytes[DENSE_MAP.magic.len()] = 1;
         let error = decode(&bytes).unwrap_err().to_string();
         assert!(error.contains("version 1") && error.contains("make it anew"), "{error}");
     }

@@ -1,16 +1,16 @@
-//! Which voxels a piece has seen occupied and which free: ray casting (Amanatides and Woo, Eurographics 1987).
+//! Which voxels a patch has seen occupied and which free: ray casting (Amanatides and Woo, Eurographics 1987).
 //!
-//! In: a piece and where it hangs. Out: for each block of voxels that it sees, the voxels in which readings end and those that they pass.
+//! In: a patch and where it hangs. Out: for each block of voxels that it sees, the voxels in which readings end and those that they pass.
 //! Where both is said of a voxel, it is occupied (Hornung et al., "OctoMap", Autonomous Robots 2013, section 5.1). Of the readings that
 //! end in one voxel one is cast: the others pass what it passes.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::dense::DenseConfig;
-use crate::dense::piece::{CellGrid, Piece};
+use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
 use crate::dense::voxels::{Bits, Block, Voxel, block_of, place_of, voxel_at};
 
-/// What a piece says of a block.
+/// What a patch says of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
     /// The block.
@@ -21,7 +21,7 @@ pub struct Seen {
     pub free: Bits,
 }
 
-/// Blocks in the making, in a box around all that a piece can see.
+/// Blocks in the making, in a box around all that a patch can see.
 struct Window {
     lowest: Block,
     size: [usize; 3],
@@ -92,8 +92,8 @@ impl Window {
     }
 }
 
-/// What a piece that hangs at `t_map_cam` says, ordered by block.
-pub fn trace(config: &DenseConfig, grid: &CellGrid, piece: &Piece, t_map_cam: &Isometry3<f64>) -> Vec<Seen> {
+/// What a patch that hangs at `t_map_cam` says, ordered by block.
+pub fn trace(config: &DenseConfig, grid: &CellGrid, patch: &KeyframePatch, t_map_cam: &Isometry3<f64>) -> Vec<Seen> {
     let per_m = 1.0 / config.resolution_m;
     let pose: Isometry3<f32> = t_map_cam.cast();
     let rotation = pose.rotation.to_rotation_matrix();
@@ -101,7 +101,7 @@ pub fn trace(config: &DenseConfig, grid: &CellGrid, piece: &Piece, t_map_cam: &I
     // The end of each reading, and whether it is a surface that stays.
     let mut ends: Vec<(Point3<f32>, bool)> = Vec::with_capacity(grid.rays().len());
     for (cell, &[x, y]) in grid.rays().iter().enumerate() {
-        let Some(reading) = piece.reading(cell) else { continue };
+        let Some(reading) = patch.reading(cell) else { continue };
         let z = reading.depth_m.min(config.max_range_m);
         let stays = !reading.moves && reading.depth_m <= config.max_range_m;
         ends.push((origin + rotation * Vector3::new(x * z, y * z, z), stays));
@@ -136,8 +136,8 @@ mod tests {
     fn readings_end_on_the_wall_and_pass_what_is_before_it() {
         let config = DenseConfig::default();
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
-        let piece = scene::wall(&grid, 2.01, None);
-        let seen = trace(&config, &grid, &piece, &Isometry3::identity());
+        let patch = scene::wall(&grid, 2.01, None);
+        let seen = trace(&config, &grid, &patch, &Isometry3::identity());
         let find = |z: f32| {
             let voxel = voxel_at(&Point3::new(0.11, 0.07, z), 20.0);
             let one = seen.iter().find(|one| one.block == block_of(voxel)).unwrap();
@@ -155,9 +155,9 @@ mod tests {
     fn what_moves_leaves_only_the_free_space_before_it() {
         let config = DenseConfig::default();
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
-        let mut piece = scene::wall(&grid, 2.01, None);
-        piece.depth.iter_mut().for_each(|d| *d |= 1 << 15);
-        let seen = trace(&config, &grid, &piece, &Isometry3::identity());
+        let mut patch = scene::wall(&grid, 2.01, None);
+        patch.depth.iter_mut().for_each(|d| *d |= 1 << 15);
+        let seen = trace(&config, &grid, &patch, &Isometry3::identity());
         assert!(seen.iter().all(|one| one.hit.is_empty()) && seen.iter().any(|one| !one.free.is_empty()));
     }
 }

@@ -1,7 +1,7 @@
-//! Occupancy with log-odds, as a function of what the pieces have seen, whatever way it came about.
+//! Occupancy with log-odds, as a function of what the patches have seen, whatever way it came about.
 //!
-//! In: pieces and where they hang, now and after each correction. Out: for each voxel whether it is occupied, free or unknown. Each block
-//! keeps what each piece said of it, and adds it up in the order of time, clamped at every step (OctoMap, section 4). So a piece that
+//! In: patches and where they hang, now and after each correction. Out: for each voxel whether it is occupied, free or unknown. Each block
+//! keeps what each patch said of it, and adds it up in the order of time, clamped at every step (OctoMap, section 4). So a patch that
 //! moves is taken out and entered anew without a trace, only the blocks concerned are added up again, and the result is to the bit that
 //! of a map made anew. The clamps let late views prevail: what has left is free after a few of them.
 
@@ -9,10 +9,10 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Translation3};
 
-use crate::dense::piece::{CellGrid, Piece};
+use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
 use crate::dense::trace::{Seen, trace};
 use crate::dense::voxels::{Bits, Block, SIDE, VOXELS, Voxel, block_of, place_of, voxel_in};
-use crate::dense::{DenseConfig, Survey};
+use crate::dense::{DenseConfig, DenseMap};
 
 /// Log-odds are kept in thousandths.
 const PER_UNIT: f32 = 1000.0;
@@ -23,8 +23,8 @@ pub struct Volume {
     config: DenseConfig,
     steps: Steps,
     blocks: BTreeMap<Block, BlockState>,
-    /// Where each piece hangs and what it touches, by number; `None` for those that are not in the volume.
-    pieces: Vec<Option<Entered>>,
+    /// Where each patch hangs and what it touches, by number; `None` for those that are not in the volume.
+    patches: Vec<Option<Entered>>,
 }
 
 #[derive(Clone, Debug)]
@@ -43,7 +43,7 @@ struct Steps {
     occupied: i16,
 }
 
-/// What pieces say of a block, by their number, and what it adds up to.
+/// What patches say of a block, by their number, and what it adds up to.
 #[derive(Clone, Debug, Default)]
 struct BlockState {
     said: Vec<(u32, Bits, Bits)>,
@@ -75,7 +75,7 @@ impl Volume {
             most: log_odds(config.clamp_max),
             occupied: log_odds(config.occupied),
         };
-        Self { config: config.clone(), steps, blocks: BTreeMap::new(), pieces: Vec::new() }
+        Self { config: config.clone(), steps, blocks: BTreeMap::new(), patches: Vec::new() }
     }
 
     /// The configuration it was made with.
@@ -83,10 +83,16 @@ impl Volume {
         &self.config
     }
 
-    /// Enters piece number `number`, or moves it if it hangs elsewhere by now: if its surfaces may be off by more than
+    /// Enters patch number `number`, or moves it if it hangs elsewhere by now: if its surfaces may be off by more than
     /// `follow_voxels`. `None` takes it out. Returns whether anything changed.
-    pub fn place(&mut self, number: usize, grid: &CellGrid, piece: &Piece, t_map_cam: Option<&Isometry3<f64>>) -> bool {
-        let entered = self.pieces.get(number).and_then(Option::as_ref);
+    pub fn place(
+        &mut self,
+        number: usize,
+        grid: &CellGrid,
+        patch: &KeyframePatch,
+        t_map_cam: Option<&Isometry3<f64>>,
+    ) -> bool {
+        let entered = self.patches.get(number).and_then(Option::as_ref);
         match (entered, t_map_cam) {
             (None, None) => return false,
             (Some(entered), Some(pose)) if !self.has_moved(&entered.t_map_cam, pose) => return false,
@@ -94,7 +100,7 @@ impl Volume {
         }
         self.take_out(number);
         if let Some(pose) = t_map_cam {
-            self.enter(number, pose, trace(&self.config, grid, piece, pose));
+            self.enter(number, pose, trace(&self.config, grid, patch, pose));
         }
         true
     }
@@ -108,8 +114,8 @@ impl Volume {
     }
 
     fn enter(&mut self, number: usize, t_map_cam: &Isometry3<f64>, seen: Vec<Seen>) {
-        if self.pieces.len() <= number {
-            self.pieces.resize_with(number + 1, || None);
+        if self.patches.len() <= number {
+            self.patches.resize_with(number + 1, || None);
         }
         let mut blocks = Vec::with_capacity(seen.len());
         for Seen { block, hit, free } in seen {
@@ -121,11 +127,11 @@ impl Volume {
             }
             blocks.push(block);
         }
-        self.pieces[number] = Some(Entered { t_map_cam: *t_map_cam, blocks });
+        self.patches[number] = Some(Entered { t_map_cam: *t_map_cam, blocks });
     }
 
     fn take_out(&mut self, number: usize) {
-        let Some(entered) = self.pieces.get_mut(number).and_then(Option::take) else { return };
+        let Some(entered) = self.patches.get_mut(number).and_then(Option::take) else { return };
         for block in entered.blocks {
             let Some(state) = self.blocks.get_mut(&block) else { continue };
             let at = state.said.partition_point(|(earlier, ..)| (*earlier as usize) < number);
@@ -185,41 +191,41 @@ impl Volume {
         self.blocks.keys().copied()
     }
 
-    /// Numbers of the pieces that have something to say of a block, ascending.
+    /// Numbers of the patches that have something to say of a block, ascending.
     pub fn seen_by(&self, block: Block) -> impl Iterator<Item = usize> {
         self.blocks.get(&block).into_iter().flat_map(|state| state.said.iter().map(|(number, ..)| *number as usize))
     }
 
-    /// Where a piece hangs in the volume.
+    /// Where a patch hangs in the volume.
     pub fn pose(&self, number: usize) -> Option<&Isometry3<f64>> {
-        Some(&self.pieces.get(number)?.as_ref()?.t_map_cam)
+        Some(&self.patches.get(number)?.as_ref()?.t_map_cam)
     }
 
-    /// Bytes that the volume of a survey takes at most: what its box holds, and what each piece can say of what is in its range.
-    pub fn bytes_at_most(config: &DenseConfig, survey: &Survey) -> usize {
+    /// Bytes that the volume of a dense_map takes at most: what its box holds, and what each patch can say of what is in its range.
+    pub fn bytes_at_most(config: &DenseConfig, dense_map: &DenseMap) -> usize {
         let side_m = f64::from(config.resolution_m) * f64::from(SIDE);
         let range_m = f64::from(config.max_range_m);
         let blocks = |extent_m: [f64; 3]| extent_m.iter().map(|m| (m / side_m).ceil() + 1.0).product::<f64>();
-        let centers = survey.pieces.iter().map(|piece| piece.t_world_cam.translation.vector);
+        let centers = dense_map.patches.iter().map(|patch| patch.t_world_cam.translation.vector);
         let (low, high) = centers.clone().fold(([f64::MAX; 3], [f64::MIN; 3]), |(low, high), c| {
             ([0, 1, 2].map(|i| low[i].min(c[i])), [0, 1, 2].map(|i| high[i].max(c[i])))
         });
         let extent = [0, 1, 2].map(|i| (high[i] - low[i]).max(0.0) + 2.0 * range_m);
         // A pyramid with the picture as its base holds a third of a box.
-        let camera = survey.grid.camera();
+        let camera = dense_map.grid.camera();
         let [width, height] = [camera.width as f64 / camera.fx, camera.height as f64 / camera.fy].map(|w| w * range_m);
         let each = blocks([range_m, width, height]).min(blocks(extent)) / 2.0;
         let state = size_of::<BlockState>() + size_of::<Block>() + 2 * VOXELS;
         let said = size_of::<(u32, Bits, Bits)>() + size_of::<Block>();
-        (blocks(extent).min(each * survey.pieces.len() as f64) * state as f64
-            + each * (survey.pieces.len() * said) as f64) as usize
+        (blocks(extent).min(each * dense_map.patches.len() as f64) * state as f64
+            + each * (dense_map.patches.len() * said) as f64) as usize
     }
 
-    /// Bytes of memory that the volume takes, pieces not counted.
+    /// Bytes of memory that the volume takes, patches not counted.
     pub fn bytes(&self) -> usize {
         let said = size_of::<(u32, Bits, Bits)>();
         let states: usize = self.blocks.values().map(|s| s.said.capacity() * said + 2 * VOXELS).sum();
-        let entered: usize = self.pieces.iter().flatten().map(|p| p.blocks.capacity() * size_of::<Block>()).sum();
+        let entered: usize = self.patches.iter().flatten().map(|p| p.blocks.capacity() * size_of::<Block>()).sum();
         states + entered + self.blocks.len() * (size_of::<BlockState>() + size_of::<Block>())
     }
 }
@@ -269,8 +275,8 @@ mod tests {
             let mut volume = Volume::new(&self.config);
             let (with, without) = (scene::wall(&self.grid, 3.01, Some(depth_m)), scene::wall(&self.grid, 3.01, None));
             for number in 0..views + gone {
-                let piece = if number < views { &with } else { &without };
-                volume.place(number, &self.grid, piece, Some(&Isometry3::identity()));
+                let patch = if number < views { &with } else { &without };
+                volume.place(number, &self.grid, patch, Some(&Isometry3::identity()));
             }
             volume.settle();
             volume
@@ -295,24 +301,24 @@ mod tests {
     #[test]
     fn a_piece_that_moves_leaves_no_trace_where_it_was() {
         let bench = Bench::new();
-        let piece = scene::wall(&bench.grid, 2.01, Some(1.22));
+        let patch = scene::wall(&bench.grid, 2.01, Some(1.22));
         let poses: Vec<_> =
             (0..6).map(|i| Isometry3::new(Vector3::new(0.1 * i as f64, 0.0, 0.0), Vector3::y() * 0.05)).collect();
         let corrected: Vec<_> =
             poses.iter().map(|pose| Isometry3::new(Vector3::new(0.0, 0.3, 0.1), Vector3::x() * 0.1) * pose).collect();
         let mut moved = Volume::new(&bench.config);
         for (number, pose) in poses.iter().enumerate() {
-            moved.place(number, &bench.grid, &piece, Some(pose));
+            moved.place(number, &bench.grid, &patch, Some(pose));
             moved.settle();
         }
         // The last one is of another world by now.
         for (number, pose) in corrected.iter().enumerate() {
-            assert!(moved.place(number, &bench.grid, &piece, Some(pose).filter(|_| number < 5)));
+            assert!(moved.place(number, &bench.grid, &patch, Some(pose).filter(|_| number < 5)));
         }
         moved.settle();
         let mut anew = Volume::new(&bench.config);
         corrected.iter().take(5).enumerate().for_each(|(number, pose)| {
-            anew.place(number, &bench.grid, &piece, Some(pose));
+            anew.place(number, &bench.grid, &patch, Some(pose));
         });
         anew.settle();
         assert!(moved.voxels().eq(anew.voxels()) && anew.voxels().count() > 1000);
@@ -322,9 +328,9 @@ mod tests {
     fn a_correction_too_small_to_matter_costs_nothing() {
         let bench = Bench::new();
         let mut volume = bench.thing(1.5, 1, 0);
-        let piece = scene::wall(&bench.grid, 3.01, Some(1.5));
+        let patch = scene::wall(&bench.grid, 3.01, Some(1.5));
         let pose = Isometry3::translation(0.01, 0.0, 0.0);
-        assert!(!volume.place(0, &bench.grid, &piece, Some(&pose)));
-        assert!(volume.place(0, &bench.grid, &piece, Some(&Isometry3::translation(0.05, 0.0, 0.0))));
+        assert!(!volume.place(0, &bench.grid, &patch, Some(&pose)));
+        assert!(volume.place(0, &bench.grid, &patch, Some(&Isometry3::translation(0.05, 0.0, 0.0))));
     }
 }

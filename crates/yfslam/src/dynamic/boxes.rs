@@ -2,7 +2,7 @@
 
 use crate::config::DynamicConfig;
 use crate::dynamic::region::apply;
-use crate::dynamic::{DynamicFilter, Evidence, MovingMask, Region};
+use crate::dynamic::{DynamicFilter, FilterInput, MovingMask, Region};
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
 
@@ -15,11 +15,11 @@ pub struct Boxes {
 }
 
 impl DynamicFilter for Boxes {
-    fn before_pose(&mut self, config: &DynamicConfig, evidence: &Evidence<'_>, features: &mut FrameFeatures) {
+    fn before_pose(&mut self, config: &DynamicConfig, input: &FilterInput<'_>, features: &mut FrameFeatures) {
         self.regions.clear();
-        let certain = evidence.movable.iter().filter(|d| d.score >= config.open_score);
+        let certain = input.movable.iter().filter(|d| d.score >= config.open_score);
         self.regions.extend(certain.map(|d| Region { bbox: d.bbox, score: d.score, misses: 0, depth_m: None }));
-        apply(config, &mut self.regions, &mut self.given_up, evidence.depth, features, evidence.sensor);
+        apply(config, &mut self.regions, &mut self.given_up, input.depth, features, input.sensor);
     }
 
     fn regions(&self) -> &[Region] {

@@ -4,18 +4,6 @@
 
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
-use serde::{Deserialize, Serialize};
-
-/// How the largest group is sought.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Grouping {
-    /// The paper's Geometric Depth RANSAC: models are random pairs of depths, drawn from a seeded generator.
-    Ransac,
-    /// A sliding window over the sorted depths: always the largest group, no draws.
-    #[default]
-    Exact,
-}
 
 /// A run of like depths.
 #[derive(Clone, Copy, Debug, PartialEq)]

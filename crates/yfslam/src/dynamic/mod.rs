@@ -3,133 +3,112 @@
 //! In: boxes of movable objects, the depth image, the frame's features. Out: each feature's trust. Nothing else in the core knows that
 //! people exist. One file per method; [`Method::filter`] makes the filter that a name stands for.
 
-mod body_depth;
-mod body_mask;
+mod baselines;
 mod boxes;
 pub mod depth_group;
-mod dms;
-mod ds;
-mod dyna;
 mod full;
 mod none;
-mod outline;
 mod region;
-mod things;
+pub(crate) mod segment;
 mod tracks;
-mod views;
-mod yf;
+mod yf_slam;
 
-use serde::{Deserialize, Serialize};
-
-use crate::config::DynamicConfig;
-use crate::detection::Detection;
+use crate::config::{DynamicConfig, Method};
+use crate::context::SensorModel;
+use crate::detect::Detection;
 use crate::features::FrameFeatures;
 use crate::geometry::Pose;
 use crate::image::{DepthImage, GrayImage, Image};
-use crate::map::{KeyFrameId, Map};
-use crate::sensor::SensorModel;
+use crate::map::{KeyframeRelativePose, Map};
 pub use region::{MovingMask, Region};
-pub use things::Things;
 
-/// How moving things are kept out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// Every feature is trusted, as in ORB-SLAM2.
-    None,
-    /// Every feature inside a box is dropped.
-    Boxes,
-    /// YF-SLAM: inside a box, the depth group of the body is dropped and the background stays.
-    Yf,
-    /// DS-SLAM: people are dropped while anything on them moves against the epipolar geometry.
-    Ds,
-    /// DynaSLAM: people are dropped, and what stands where earlier keyframes saw farther.
-    Dyna,
-    /// DMS-SLAM: features whose motion their neighbours do not share are dropped; no detector.
-    Dms,
-    /// Outlines of bodies in depth, and whatever has moved since earlier views.
-    #[default]
-    Full,
-}
-
-/// What is known of a frame before its pose.
-pub struct Evidence<'a> {
-    /// Boxes of movable objects, at any score.
+/// What is known about a frame before its pose.
+#[non_exhaustive]
+pub struct FilterInput<'a> {
+    /// Detections of movable objects, at any score.
     pub movable: &'a [Detection],
-    /// Whether somebody looked for such boxes in this frame: without a look, no box tells nothing.
-    pub looked: bool,
-    /// Pixels of movable objects, where somebody knows them.
+    /// Whether the image was searched for such objects: without a search, a missing box means nothing.
+    pub detected: bool,
+    /// Pixels of movable objects, where a segmentation is at hand: 0 where there is none.
     pub mask: Option<&'a Image<u8>>,
-    /// The picture.
+    /// The grey image.
     pub gray: &'a GrayImage,
-    /// The depth image.
+    /// The depth image; of a stereo camera it is zero but around features with a depth, of a single camera zero everywhere.
     pub depth: &'a DepthImage,
-    /// The camera, and the scales of the pyramid's levels.
-    pub sensor: &'a SensorModel,
+    /// The camera, and the scales of the pyramid levels.
+    pub(crate) sensor: &'a SensorModel,
 }
 
-/// A first pose, and what it can be compared with.
+/// The first pose of a frame, and what it can be compared with.
+#[non_exhaustive]
 pub struct FirstPose<'a> {
-    /// The camera.
-    pub sensor: &'a SensorModel,
+    /// The camera, and the scales of the pyramid levels.
+    pub(crate) sensor: &'a SensorModel,
     /// The map.
     pub map: &'a Map,
     /// The pose of the frame.
     pub t_cam_world: &'a Pose,
 }
 
-/// A keyframe and the pose of a frame seen from there, `t_cam_reference`: it moves along when the map is corrected.
-pub type Tie = (KeyFrameId, Pose);
-
-impl Method {
-    /// The filter of this name; its random draws start from `seed`.
-    pub fn filter(self, seed: u64) -> Box<dyn DynamicFilter> {
-        match self {
-            Self::None => Box::new(none::NoFilter),
-            Self::Boxes => Box::<boxes::Boxes>::default(),
-            Self::Yf => Box::new(yf::Yf::new(seed)),
-            Self::Ds => Box::new(ds::Ds::new(seed)),
-            Self::Dyna => Box::new(dyna::Dyna::new(seed)),
-            Self::Dms => Box::<dms::Dms>::default(),
-            Self::Full => Box::new(full::Full::new(seed)),
-        }
-    }
-
-    /// Whether boxes of movable objects tell it anything.
-    pub fn needs_boxes(self) -> bool {
-        !matches!(self, Self::None | Self::Dms)
+/// Returns the filter of a method; its random draws start from `seed`.
+pub fn filter_for(method: Method, seed: u64) -> Box<dyn DynamicFilter> {
+    match method {
+        Method::None => Box::new(none::NoFilter),
+        Method::Boxes => Box::<boxes::Boxes>::default(),
+        Method::YfSlam => Box::new(yf_slam::YfSlam::new(seed)),
+        Method::DsSlam => Box::new(baselines::DsSlam::new(seed)),
+        Method::DynaSlam => Box::new(baselines::DynaSlam::new(seed)),
+        Method::DmsSlam => Box::<baselines::DmsSlam>::default(),
+        Method::Full => Box::new(full::Full::new(seed)),
     }
 }
 
-/// Decides about the features of one frame after another. Buffers are reused: after warm-up no call allocates.
+/// Decides for the features of one frame after another how far each is trusted to be static. Buffers are reused: after warm-up no call
+/// allocates.
+///
+/// Only [`DynamicFilter::before_pose`] is required.
 pub trait DynamicFilter: Send + Sync {
-    /// Sets the trust of `features` from what boxes, masks and pictures tell, before the pose is known.
-    fn before_pose(&mut self, config: &DynamicConfig, evidence: &Evidence<'_>, features: &mut FrameFeatures);
+    /// Sets [`Feature::trust`](crate::Feature::trust) of each feature, which is 1 at first, before the pose is known.
+    fn before_pose(&mut self, config: &DynamicConfig, input: &FilterInput<'_>, features: &mut FrameFeatures);
 
-    /// Sharpens the trust of `features` when a first pose stands. Returns whether any lost it.
+    /// Changes the trust of features after a first pose was estimated. Returns whether any feature lost its trust.
     fn after_pose(&mut self, _config: &DynamicConfig, _first: &FirstPose<'_>, _features: &mut FrameFeatures) -> bool {
         false
     }
 
-    /// Withdraws what boxes speak against, since the map cannot be followed without it: such features get the trust
-    /// [`FullConfig::doubted_trust`](crate::config::FullConfig::doubted_trust). Returns whether there are any.
+    /// Gives features that boxes alone exclude the trust `dynamic.full.doubted_trust`, because the frame cannot be tracked without them.
+    /// Returns whether there are any.
     fn doubt_boxes(&mut self, _config: &DynamicConfig, _features: &mut FrameFeatures) -> bool {
         false
     }
 
-    /// Ends the doubts of a frame that was tracked: of what boxes speak against, the features that are landmarks have kept some trust.
+    /// Ends the doubts about a frame that was tracked: features that boxes exclude have kept some trust if they match landmarks.
     fn settle_doubts(&mut self, _config: &DynamicConfig, _features: &FrameFeatures) {}
 
-    /// Takes note of the pose of the frame.
-    fn end_frame(&mut self, _config: &DynamicConfig, _timestamp_ns: i64, _tie: Tie) {}
+    /// Receives the pose of the tracked frame, relative to a keyframe.
+    fn end_frame(&mut self, _config: &DynamicConfig, _timestamp_ns: i64, _pose: KeyframeRelativePose) {}
 
-    /// The boxes in the last frame that were found to hold something that moves.
-    fn regions(&self) -> &[Region];
+    /// Returns the regions of the last frame that were found to move.
+    fn regions(&self) -> &[Region] {
+        &[]
+    }
 
-    /// What moves in the last frame, whose depth image is given, pixel by pixel: more than features need, for whoever maps surfaces. What
-    /// was given up for want of features counts, and bodies are outlined where the method has them.
-    fn moving_mask(&self, config: &DynamicConfig, depth: &DepthImage) -> MovingMask;
+    /// Returns what moves in the last frame, whose depth image is given, for the dense map: also what was trusted because too few features
+    /// were left.
+    fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
+        MovingMask::from_regions(self.regions().to_vec())
+    }
 
-    /// Forgets earlier views: the world begins anew.
-    fn forget_views(&mut self) {}
+    /// Forgets earlier frames: a new world begins.
+    fn reset_history(&mut self) {}
+
+    /// Returns whether the filter uses bounding boxes or masks of movable objects.
+    fn needs_boxes(&self) -> bool {
+        true
+    }
+
+    /// Returns whether landmarks are removed from the map when measured depth shows free space where they were.
+    fn checks_visibility(&self) -> bool {
+        false
+    }
 }

@@ -1,11 +1,11 @@
 //! Parts of the image that move, as boxes with depths, and the features on them.
 
 use crate::config::DynamicConfig;
-use crate::detection::BoundingBox;
-use crate::dynamic::body_mask::BodyMask;
+use crate::context::SensorModel;
+use crate::detect::BoundingBox;
+use crate::dynamic::segment::mask::InstanceMask;
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
-use crate::sensor::SensorModel;
 
 /// A part of the image that was found to move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,13 +23,18 @@ pub struct Region {
 /// What moves in a frame, pixel by pixel.
 #[derive(Clone, Debug, Default)]
 pub struct MovingMask {
-    /// Outlines.
-    pub(super) bodies: BodyMask,
+    /// Segmenter.
+    pub(super) bodies: InstanceMask,
     /// Boxes, whole or at the depth of a body.
     pub(super) regions: Vec<Region>,
 }
 
 impl MovingMask {
+    /// Returns the mask of regions, each whole or at the depth of its body.
+    pub fn from_regions(regions: Vec<Region>) -> Self {
+        Self { regions, ..Self::default() }
+    }
+
     /// Whether a position of the raw image, px, shows something that moves, or lies within `edge_px` of it.
     pub fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
         self.bodies.covers(raw, edge_px) || self.regions.iter().any(|region| region.covers(depth, raw, edge_px))

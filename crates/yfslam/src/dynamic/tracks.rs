@@ -1,12 +1,12 @@
 //! Boxes over time: a detector that blinks must not let a person in.
 //!
-//! In: the boxes of a frame, then the outlines of the bodies in them. Out: tracks, opened at a high score, kept at a low one, and carried
+//! In: the boxes of a frame, then the segmenter of the bodies in them. Out: tracks, opened at a high score, kept at a low one, and carried
 //! over misses with the box's own velocity (Dynamic-VINS, section on missed detections) or, where a body is outlined, with the body.
 
 use crate::config::DynamicConfig;
-use crate::detection::{BoundingBox, Detection};
+use crate::detect::{BoundingBox, Detection};
 use crate::dynamic::Region;
-use crate::dynamic::body_mask::Extent;
+use crate::dynamic::segment::mask::Extent;
 
 /// A movable object followed in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub struct Track {
     pub misses: usize,
     /// Depth of the body when last seen, m.
     pub depth_m: Option<f32>,
-    /// Frames since it was detected or, by a method that outlines bodies, outlined there.
+    /// Frames since it was detected or, by a method that segmenter bodies, outlined there.
     pub depth_age: usize,
     /// Whether it was found to show nothing; the next update drops it.
     pub ended: bool,
@@ -59,7 +59,7 @@ impl Tracks {
     ) {
         self.carry([width, height]);
         self.list.iter_mut().for_each(|track| track.missed_looks += 1);
-        // Pairs of track and detection by descending overlap; indices break ties.
+        // Pairs of track and detection by descending overlap; indices break relative_poses.
         self.pairs.clear();
         for (t, track) in self.list.iter().enumerate() {
             for (d, (detection, depth_m)) in detections.iter().zip(depths_m).enumerate() {

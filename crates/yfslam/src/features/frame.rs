@@ -199,18 +199,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn camera() -> Camera {
-        Camera {
-            width: 640,
-            height: 480,
-            fx: 517.3,
-            fy: 516.5,
-            cx: 318.6,
-            cy: 255.3,
-            distortion: [0.262383, -0.953104, -0.005358, 0.002628, 1.163314],
-            depth_factor: 5000.0,
-            fps: 30.0,
-            bf: 40.0,
-        }
+        Camera::pinhole(640, 480, 517.3, 516.5, 318.6, 255.3)
+            .with_distortion([0.262383, -0.953104, -0.005358, 0.002628, 1.163314])
     }
 
     proptest! {

@@ -12,6 +12,7 @@ mod orb;
 mod orientation;
 mod pattern;
 pub mod stereo;
+pub mod stereo_worker;
 
 pub use frame::{Feature, FrameFeatures, ImageBounds};
 pub use orb::{Features, OrbExtractor};

@@ -53,9 +53,9 @@ impl StereoView {
         }
     }
 
-    /// Looks at the next picture; `count` features are asked for.
-    pub fn see(&mut self, picture: &RgbImage, count: usize) {
-        gray_from_rgb(picture, &mut self.gray);
+    /// Extracts about `count` features of the next image.
+    pub fn extract(&mut self, image: &RgbImage, count: usize) {
+        gray_from_rgb(image, &mut self.gray);
         self.extractor.set_count(count);
         self.extractor.extract(&self.gray, &mut self.features);
         self.sort_by_row();

@@ -11,17 +11,18 @@ mod triangulate;
 mod two_view;
 
 pub use essential::motions_of_essential;
-pub use fundamental::{Pair, eight_point, epipolar_distance, fundamental_ransac};
-pub use homography::{homography, motions_of_homography, transfer_distance2};
+pub use fundamental::{Pair, epipolar_distance, fundamental_ransac};
 pub use p3p::p3p;
 pub use pinhole::Pinhole;
 pub use se3::{perturbed, se3_exp, se3_log, skew};
+#[cfg(test)]
+pub use sim3::sim3_from_tangent;
 pub use sim3::{
-    Similarity, Tangent, TangentMap, absolute_orientation, rigid, sim3_adjoint, sim3_from_tangent, sim3_perturbed,
-    sim3_tangent, unscaled, with_scale,
+    Similarity, Tangent, TangentMap, absolute_orientation, rigid, sim3_adjoint, sim3_perturbed, sim3_tangent, unscaled,
+    with_scale,
 };
 pub use triangulate::midpoint;
-pub use two_view::{Model, Refused, TwoView, reconstruct};
+pub use two_view::{TwoView, reconstruct};
 
 /// A rigid motion; `t_a_b` maps points given in frame b into frame a.
 pub type Pose = nalgebra::Isometry3<f64>;

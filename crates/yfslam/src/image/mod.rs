@@ -2,6 +2,7 @@
 
 mod blur;
 mod flow;
+mod from_raw;
 mod gray;
 pub(crate) mod kernels;
 pub(crate) mod plane;
@@ -9,6 +10,7 @@ mod pyramid;
 
 pub(crate) use blur::{BLUR_RADIUS, blur};
 pub(crate) use flow::Flow;
+pub use from_raw::ImageError;
 pub use gray::gray_from_rgb;
 pub(crate) use plane::{LANES, Plane};
 pub(crate) use pyramid::Pyramid;

@@ -6,13 +6,12 @@
 
 use slotmap::SecondaryMap;
 
-use super::recognise::Candidate;
-use crate::config::Config;
+use super::place_recognition::Candidate;
+use crate::context::Context;
 use crate::geometry::{Pose, Similarity, rigid, unscaled};
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::mapping::fuse;
 use crate::optimize::pose_graph::{Edge, PoseGraph};
-use crate::sensor::SensorModel;
 use crate::tracking::TrackedFrame;
 
 /// The two sides of a loop, and all poses as they were.
@@ -32,14 +31,14 @@ struct Loop {
 /// Closes the loop between `keyframe` and the place of `candidate`, in which it was located as `located`: there, `s_cam_place` maps the
 /// place's world into its camera and unit.
 pub fn close(
-    sensor: &SensorModel,
-    config: &Config,
+    context: &Context,
     map: &mut Map,
     keyframe: KeyFrameId,
     candidate: &Candidate,
     located: &TrackedFrame,
     s_cam_place: &Similarity,
 ) {
+    let Context { sensor: _, config: _ } = context;
     let Some(k) = map.keyframe(keyframe) else { return };
     let s_far_near = s_cam_place.inverse() * k.t_cam_world;
     let is_one_map = map.root(keyframe) == map.root(candidate.keyframe);
@@ -50,10 +49,10 @@ pub fn close(
     let s_cam_world = if is_one_map { *s_cam_place } else { unscaled(&rigid(s_cam_place)) };
     let Some(mut ends) = Loop::new(map, keyframe, &s_cam_world) else { return };
     ends.move_near_side(map);
-    ends.join(sensor, config, map, keyframe, candidate, located);
+    ends.join(context, map, keyframe, candidate, located);
     map.add_loop_edge(keyframe, candidate.keyframe);
     if is_one_map {
-        ends.spread(sensor, config, map, keyframe);
+        ends.spread(context, map, keyframe);
     }
 }
 
@@ -72,7 +71,7 @@ impl Loop {
         for &id in &self.near {
             let (Some(&old), Some(&new)) = (self.before.get(id), self.moved.get(id)) else { continue };
             let Some(keyframe) = map.keyframe(id) else { continue };
-            let seen: Vec<LandmarkId> = keyframe.sights().map(|(_, l)| l).collect();
+            let seen: Vec<LandmarkId> = keyframe.observed().map(|(_, l)| l).collect();
             for landmark in seen {
                 let Some(position) = map.landmark(landmark).map(|l| l.position) else { continue };
                 if self.carried.insert(landmark, id).is_none() {
@@ -86,15 +85,15 @@ impl Loop {
     /// Joins what both sides see, and notes which keyframes that connects.
     fn join(
         &mut self,
-        sensor: &SensorModel,
-        config: &Config,
+        context: &Context,
         map: &mut Map,
         keyframe: KeyFrameId,
         candidate: &Candidate,
         located: &TrackedFrame,
     ) {
-        for (feature, sight) in located.sights.iter().enumerate() {
-            let Some(far) = sight.and_then(|s| s.landmark) else { continue };
+        let Context { sensor: _, config: _ } = context;
+        for (feature, matched) in located.matches.iter().enumerate() {
+            let Some(far) = matched.and_then(|s| s.landmark) else { continue };
             match map.keyframe(keyframe).and_then(|k| k.landmarks.get(feature).copied()) {
                 Some(Some(near)) => map.merge_landmarks(far, near),
                 Some(None) => map.add_observation(far, keyframe, feature),
@@ -104,7 +103,7 @@ impl Loop {
         let far_side: Vec<KeyFrameId> = candidate.group.iter().filter(|id| !self.near.contains(id)).copied().collect();
         let far = map.landmarks_of(&far_side);
         for &target in &self.near {
-            fuse::fuse_into(sensor, config, map, target, &far);
+            fuse::fuse_into(context, map, target, &far);
         }
         for &id in &self.near {
             let neighbours = |map: &Map| -> Vec<KeyFrameId> {
@@ -121,7 +120,8 @@ impl Loop {
     }
 
     /// Spreads the error over the essential graph: the spanning tree, all loops, and strong covisibility.
-    fn spread(&self, sensor: &SensorModel, config: &Config, map: &mut Map, keyframe: KeyFrameId) {
+    fn spread(&self, context: &Context, map: &mut Map, keyframe: KeyFrameId) {
+        let Context { sensor, config } = context;
         let Some(root) = map.root(keyframe) else { return };
         let members = map.submap(root);
         // In the order of time the equations are nearly a band. The root, which defines the world, stays.

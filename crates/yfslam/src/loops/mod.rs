@@ -9,12 +9,12 @@
 //! In: keyframes, and frames whose pose is unknown. Out: poses, and a map without the drift of a way that led back.
 
 mod correct;
-mod index;
-mod plausible;
-mod recognise;
+mod descriptor_index;
+mod drift_gate;
+mod global_bundle;
+mod place_recognition;
 mod similarity;
 mod verify;
-mod whole;
 
 use std::sync::{Mutex, PoisonError};
 
@@ -22,18 +22,18 @@ use nalgebra::Point3;
 use slotmap::SecondaryMap;
 
 use crate::config::Config;
+use crate::context::Context;
 use crate::geometry::{Pose, Similarity, rigid, unscaled};
 use crate::map::{KeyFrame, KeyFrameId, Map};
-use crate::sensor::SensorModel;
-use crate::tracking::{Sight, TrackedFrame};
-use recognise::Candidate;
-pub use recognise::Recogniser;
+use crate::tracking::{Match, TrackedFrame};
+pub use global_bundle::GlobalBundle;
+use place_recognition::Candidate;
+pub use place_recognition::PlaceRecogniser;
 use verify::Evidence;
-pub use whole::WholeAdjustment;
 
 /// A loop that was closed.
 #[derive(Clone, Copy, Debug)]
-pub struct LoopClosed {
+pub struct LoopClosure {
     /// The keyframe that came back.
     pub keyframe: KeyFrameId,
     /// The keyframe of the old place that shares most with it.
@@ -51,7 +51,7 @@ pub struct LoopClosed {
 
 /// Where a camera that is lost can be at most.
 #[derive(Clone, Copy, Debug)]
-pub struct Reach {
+pub struct SearchRegion {
     /// The keyframe that it was last seen from.
     pub reference: KeyFrameId,
     /// Where it was then, in the world of that keyframe, m.
@@ -59,10 +59,10 @@ pub struct Reach {
     /// How far it can have come since, m.
     pub radius_m: f64,
     /// Likeness that a place within reach must have.
-    pub min_likeness: f64,
+    pub min_match_ratio: f64,
 }
 
-impl Reach {
+impl SearchRegion {
     fn includes(&self, map: &Map, place: KeyFrameId, t_cam_world: &Pose) -> bool {
         let center = t_cam_world.inverse_transform_point(&Point3::origin());
         (center - self.center_world).norm() <= self.radius_m && map.root(place) == map.root(self.reference)
@@ -72,31 +72,31 @@ impl Reach {
 /// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then. Of several places that it may show
 /// the likeliest is taken; one beyond `reach` has to be likelier.
 pub fn relocalise(
-    recogniser: &mut Recogniser,
-    sensor: &SensorModel,
-    config: &Config,
+    recogniser: &mut PlaceRecogniser,
+    context: &Context,
     map: &Map,
     frame: &mut TrackedFrame,
-    reach: Option<&Reach>,
+    reach: Option<&SearchRegion>,
 ) -> bool {
+    let Context { sensor: _, config } = context;
     let c = &config.places;
     let candidates = recogniser.candidates(c, map, &frame.features, |_| true);
-    let needed = Evidence { inliers: c.relocalise_min_inliers, likeness: c.relocalise_min_likeness };
-    let mut best: Option<(f64, Pose, Vec<Option<Sight>>)> = None;
+    let needed = Evidence { inliers: c.relocalise_min_inliers, match_ratio: c.relocalise_min_match_ratio };
+    let mut best: Option<(f64, Pose, Vec<Option<Match>>)> = None;
     for place in &candidates {
-        let Some(evidence) = verify::locate(sensor, config, map, place, frame, &needed) else { continue };
+        let Some(evidence) = verify::locate(context, map, place, frame, &needed) else { continue };
         let within = reach.is_some_and(|reach| reach.includes(map, place.keyframe, &frame.t_cam_world));
         tracing::debug!(?evidence, within, "a place to be found at");
-        let limit = reach.filter(|_| within).map_or(c.relocalise_min_likeness_beyond, |reach| reach.min_likeness);
-        if evidence.likeness < limit {
+        let limit = reach.filter(|_| within).map_or(c.relocalise_min_match_ratio_beyond, |reach| reach.min_match_ratio);
+        if evidence.match_ratio < limit {
             continue;
         }
-        if best.as_ref().is_none_or(|(likeness, ..)| evidence.likeness > *likeness) {
-            best = Some((evidence.likeness, frame.t_cam_world, frame.sights.clone()));
+        if best.as_ref().is_none_or(|(match_ratio, ..)| evidence.match_ratio > *match_ratio) {
+            best = Some((evidence.match_ratio, frame.t_cam_world, frame.matches.clone()));
         }
     }
-    let Some((_, t_cam_world, sights)) = best else { return false };
-    (frame.t_cam_world, frame.sights) = (t_cam_world, sights);
+    let Some((_, t_cam_world, matches)) = best else { return false };
+    (frame.t_cam_world, frame.matches) = (t_cam_world, matches);
     true
 }
 
@@ -120,12 +120,12 @@ impl LoopCloser {
     /// Looks whether a new keyframe shows an old place, and closes the loop if so; the map is then to be adjusted as a whole.
     pub fn close(
         &mut self,
-        sensor: &SensorModel,
-        config: &Config,
-        recogniser: &Mutex<Recogniser>,
+        context: &Context,
+        recogniser: &Mutex<PlaceRecogniser>,
         map: &mut Map,
         keyframe: KeyFrameId,
-    ) -> Option<LoopClosed> {
+    ) -> Option<LoopClosure> {
+        let Context { sensor: _, config } = context;
         let k = map.keyframe(keyframe)?;
         let (sequence, estimated) = (k.sequence, k.t_cam_world);
         if self.last_loop.is_some_and(|last| sequence < last + config.loops.min_keyframes_between) {
@@ -137,22 +137,22 @@ impl LoopCloser {
             old_places(&mut recogniser.lock().unwrap_or_else(PoisonError::into_inner), config, map, keyframe);
         for place in self.consistent_ones(config, candidates) {
             let c = &config.loops;
-            let needed = Evidence { inliers: c.min_inliers, likeness: c.min_likeness };
-            let found = verify::locate(sensor, config, map, &place, &mut self.frame, &needed);
+            let needed = Evidence { inliers: c.min_inliers, match_ratio: c.min_match_ratio };
+            let found = verify::locate(context, map, &place, &mut self.frame, &needed);
             let Some(evidence) = found else { continue };
-            let Some(s_cam_place) = self.place_seen_from(sensor, config, map, keyframe, &place) else { continue };
+            let Some(s_cam_place) = self.place_seen_from(context, map, keyframe, &place) else { continue };
             let drift = estimated * s_cam_place.inverse();
-            let plausible = plausible::is_plausible(c, map, keyframe, place.keyframe, &drift);
+            let plausible = drift_gate::is_plausible(c, map, keyframe, place.keyframe, &drift);
             tracing::debug!(?evidence, %drift, plausible, "an old place");
-            if !plausible && evidence.likeness < c.min_likeness_of_jump {
+            if !plausible && evidence.match_ratio < c.min_match_ratio_of_jump {
                 continue;
             }
             let t_keyframe_to = rigid(&s_cam_place) * map.keyframe(place.keyframe)?.t_cam_world.inverse();
             let merged_submaps = map.root(keyframe) != map.root(place.keyframe);
-            correct::close(sensor, config, map, keyframe, &place, &self.frame, &s_cam_place);
+            correct::close(context, map, keyframe, &place, &self.frame, &s_cam_place);
             self.last_loop = Some(sequence);
             self.consistent.clear();
-            return Some(LoopClosed {
+            return Some(LoopClosure {
                 keyframe,
                 to: place.keyframe,
                 inliers: evidence.inliers,
@@ -167,16 +167,16 @@ impl LoopCloser {
     /// Where the world of the old place is in the camera that was located there, in the unit of the keyframe.
     fn place_seen_from(
         &self,
-        sensor: &SensorModel,
-        config: &Config,
+        context: &Context,
         map: &Map,
         keyframe: KeyFrameId,
         place: &Candidate,
     ) -> Option<Similarity> {
+        let Context { sensor, config: _ } = context;
         if sensor.measures_depth {
             return Some(unscaled(&self.frame.t_cam_world));
         }
-        similarity::measure(sensor, config, map, keyframe, place, &self.frame)
+        similarity::measure(context, map, keyframe, place, &self.frame)
     }
 
     /// Those candidates that the last keyframes agreed on: a candidate agrees with an earlier one if their groups overlap.
@@ -197,14 +197,14 @@ impl LoopCloser {
 }
 
 /// Places that resemble the keyframe and are not within two steps of covisibility, where tracking and mapping look anyway.
-fn old_places(recogniser: &mut Recogniser, config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<Candidate> {
+fn old_places(recogniser: &mut PlaceRecogniser, config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<Candidate> {
     let Some(k) = map.keyframe(keyframe) else { return Vec::new() };
     let covisible = |k: &KeyFrame| k.covisible.iter().map(|(id, _)| (*id, ())).collect::<Vec<_>>();
     let mut near: SecondaryMap<KeyFrameId, ()> = covisible(k).into_iter().chain([(keyframe, ())]).collect();
     let first: Vec<KeyFrameId> = near.keys().collect();
     near.extend(first.into_iter().filter_map(|id| map.keyframe(id)).flat_map(covisible));
     let mut local = SecondaryMap::new();
-    for (_, landmark) in near.keys().filter_map(|id| map.keyframe(id)).flat_map(|k| k.sights()) {
+    for (_, landmark) in near.keys().filter_map(|id| map.keyframe(id)).flat_map(|k| k.observed()) {
         local.insert(landmark, ());
     }
     let mut candidates = recogniser.candidates(&config.places, map, &k.features, |id| !local.contains_key(id));

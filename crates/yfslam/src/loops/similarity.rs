@@ -4,25 +4,24 @@
 //! In: a keyframe located among the landmarks of an old place, by which features of it are matched twice: to a landmark of its own
 //! surroundings and to one of the place. Out: where the place's world is in the keyframe's camera, in the unit of its surroundings.
 
-use super::recognise::Candidate;
+use super::place_recognition::Candidate;
 use super::verify::ransac;
-use crate::config::Config;
+use crate::context::{Context, SensorModel};
 use crate::geometry::{Similarity, absolute_orientation};
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::optimize::similarity::{Correspondence, optimize_similarity};
-use crate::sensor::SensorModel;
 use crate::tracking::TrackedFrame;
 
 /// The similarity `s_cam_place` from the world of the old place into the camera of `keyframe`, located there as `located`. `None` if too
 /// few landmarks agree on it.
 pub fn measure(
-    sensor: &SensorModel,
-    config: &Config,
+    context: &Context,
     map: &Map,
     keyframe: KeyFrameId,
     place: &Candidate,
     located: &TrackedFrame,
 ) -> Option<Similarity> {
+    let Context { sensor, config } = context;
     let (camera, needed) = (&sensor.pinhole, config.monocular.loop_min_pairs);
     let mut pairs = correspondences(sensor, map, keyframe, place, located);
     let mut s_place_cam = ransac(
@@ -50,7 +49,7 @@ fn correspondences(
     let Some(k) = map.keyframe(keyframe) else { return Vec::new() };
     let t_place_cam = located.t_cam_world.inverse();
     let pair = |(feature, near): (usize, LandmarkId)| {
-        let far = located.sights.get(feature).copied().flatten()?.landmark.filter(|far| *far != near)?;
+        let far = located.matches.get(feature).copied().flatten()?.landmark.filter(|far| *far != near)?;
         let (near, far) = (map.landmark(near)?, map.landmark(far)?);
         let views = place.group.iter().filter_map(|id| Some((map.keyframe(*id)?, far.feature_in(*id)?)));
         let (view, seen) = views.into_iter().next()?;
@@ -63,24 +62,24 @@ fn correspondences(
             inlier: false,
         })
     };
-    k.sights().filter_map(pair).collect()
+    k.observed().filter_map(pair).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::DepthSource;
+    use crate::config::{Config, DepthSource};
     use crate::geometry::{Pose, rigid, se3_exp, sim3_from_tangent, sim3_tangent, unscaled};
     use crate::map::scene::{Scene, camera};
-    use crate::tracking::Sight;
+    use crate::tracking::Match;
     use nalgebra::Vector6;
 
     /// An old place, and a keyframe whose surroundings are the place's by `s_near_place`, located in the place by what both see.
-    fn apart(s_near_place: &Similarity) -> (SensorModel, Config, Map, KeyFrameId, Candidate, TrackedFrame) {
+    fn apart(s_near_place: &Similarity) -> (Context, Map, KeyFrameId, Candidate, TrackedFrame) {
         let mut config = Config::default();
         // The scene has depths; all are beyond this range.
         (config.depth.source, config.depth.max_m) = (DepthSource::Motion, 1.0);
-        let sensor = SensorModel::new(&camera(), &config, &[1.0]);
+        let context = Context::new(&camera(), &config, &[1.0]);
         let (scene, mut map) = (Scene::new(), Map::default());
         let (mut place, mut near) = (Vec::new(), Vec::new());
         for k in 0..4 {
@@ -100,41 +99,41 @@ mod tests {
         let mut located = TrackedFrame::default();
         located.features.clone_from(&map.keyframe(near[1]).unwrap().features);
         located.t_cam_world = scene.pose(3);
-        located.clear_sights();
-        for (_, landmark) in place.iter().flat_map(|id| map.keyframe(*id).unwrap().sights()) {
+        located.clear_matches();
+        for (_, landmark) in place.iter().flat_map(|id| map.keyframe(*id).unwrap().observed()) {
             let l = map.landmark(landmark).unwrap();
             if let Some(i) = located.features.descriptors.iter().position(|d| *d == l.descriptor) {
-                located.sights[i] = Some(Sight::of(landmark, l));
+                located.matches[i] = Some(Match::of(landmark, l));
             }
         }
         let place = Candidate { keyframe: place[3], group: place, matches: Vec::new() };
-        (sensor, config, map, near[1], place, located)
+        (context, map, near[1], place, located)
     }
 
     #[test]
     fn the_scale_between_two_maps_is_found_though_locating_was_a_little_off() {
         let s_near_place = sim3_from_tangent(&[0.5, -0.3, 1.0, 0.2, -0.5, 0.1, 0.8].into());
-        let (sensor, config, map, keyframe, place, mut located) = apart(&s_near_place);
+        let (context, map, keyframe, place, mut located) = apart(&s_near_place);
         let truth = unscaled(&map.keyframe(keyframe).unwrap().t_cam_world) * s_near_place;
         located.t_cam_world = se3_exp(&Vector6::new(0.004, -0.003, 0.005, 0.001, 0.001, -0.001)) * located.t_cam_world;
-        let found = measure(&sensor, &config, &map, keyframe, &place, &located).unwrap();
+        let found = measure(&context, &map, keyframe, &place, &located).unwrap();
         assert!(sim3_tangent(&(found * truth.inverse())).norm() < 1e-3, "{found} {truth}");
     }
 
     #[test]
     fn landmarks_that_are_not_the_same_give_no_scale() {
-        let (sensor, config, mut map, keyframe, place, located) = apart(&Similarity::identity());
-        assert!(measure(&sensor, &config, &map, keyframe, &place, &located).is_some());
-        let near: Vec<LandmarkId> = map.keyframe(keyframe).unwrap().sights().map(|(_, id)| id).collect();
+        let (context, mut map, keyframe, place, located) = apart(&Similarity::identity());
+        assert!(measure(&context, &map, keyframe, &place, &located).is_some());
+        let near: Vec<LandmarkId> = map.keyframe(keyframe).unwrap().observed().map(|(_, id)| id).collect();
         let positions: Vec<_> = near.iter().map(|id| map.landmark(*id).unwrap().position).collect();
         for (id, position) in near.iter().zip(positions.iter().cycle().skip(7)) {
             map.set_position(*id, *position);
         }
-        assert!(measure(&sensor, &config, &map, keyframe, &place, &located).is_none());
+        assert!(measure(&context, &map, keyframe, &place, &located).is_none());
         // And where nothing is matched twice there is nothing to go by.
         let mut unmatched = located;
-        unmatched.clear_sights();
+        unmatched.clear_matches();
         unmatched.t_cam_world = Pose::identity();
-        assert!(measure(&sensor, &config, &map, keyframe, &place, &unmatched).is_none());
+        assert!(measure(&context, &map, keyframe, &place, &unmatched).is_none());
     }
 }

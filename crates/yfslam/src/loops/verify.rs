@@ -7,15 +7,15 @@ use nalgebra::{Point3, Vector3};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use super::recognise::Candidate;
-use crate::config::{Config, PlaceConfig};
+use super::place_recognition::Candidate;
+use crate::config::PlaceConfig;
+use crate::context::{Context, SensorModel};
 use crate::geometry::{Pose, p3p};
 use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
 use crate::optimize::pose_only::{self, PoseObservation};
 use crate::optimize::residual::Measurement;
-use crate::sensor::SensorModel;
 use crate::tracking::search::{Projector, search_local_map};
-use crate::tracking::{Sight, TrackedFrame};
+use crate::tracking::{Match, TrackedFrame};
 
 /// What speaks for a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,26 +24,26 @@ pub struct Evidence {
     pub inliers: usize,
     /// Landmarks that fit it and look the same, as a share of what tracking would find there, going by how often it found each of those
     /// in view and not behind what moves. Corridors are alike in their doors and lamps: there many landmarks fit, but more are missing.
-    pub likeness: f64,
+    pub match_ratio: f64,
 }
 
 impl Evidence {
     /// Whether there is as much of both as `needed`.
     pub fn suffices(&self, needed: &Self) -> bool {
-        self.inliers >= needed.inliers && self.likeness >= needed.likeness
+        self.inliers >= needed.inliers && self.match_ratio >= needed.match_ratio
     }
 }
 
 /// Locates `frame` in the place of `candidate`. Pose and matches are then those of the frame. `None` if the evidence is less than
 /// `needed`, or leaves open where the camera is.
 pub fn locate(
-    sensor: &SensorModel,
-    config: &Config,
+    context: &Context,
     map: &Map,
     candidate: &Candidate,
     frame: &mut TrackedFrame,
     needed: &Evidence,
 ) -> Option<Evidence> {
+    let Context { sensor, config } = context;
     let c = &config.places;
     let pairs: Vec<Pair> = candidate.matches.iter().filter_map(|m| Pair::new(sensor, map, frame, *m)).collect();
     // Depth, where measured, tells the true one of the solutions.
@@ -54,13 +54,13 @@ pub fn locate(
         |sample| p3p(&sample.map(|i| pairs[i].point_world), &sample.map(|i| pairs[i].ray)),
         |pose, i| pairs[i].fits(sensor, pose),
     )?;
-    frame.clear_sights();
+    frame.clear_matches();
     frame.t_cam_world = pose;
     for pair in pairs.iter().filter(|pair| pair.fits(sensor, &pose)) {
-        frame.sights[pair.feature] =
-            Some(Sight { landmark: Some(pair.landmark), point_world: pair.point_world, trust: 1.0 });
+        frame.matches[pair.feature] =
+            Some(Match { landmark: Some(pair.landmark), point_world: pair.point_world, trust: 1.0 });
     }
-    let mut inliers = frame.refine_pose(sensor, &config.pose);
+    let mut inliers = frame.refine_pose(context);
     let (mut visible, mut expected) = (Vec::new(), 0.0);
     // The second search starts from a better pose.
     for _ in 0..2 {
@@ -68,32 +68,35 @@ pub fn locate(
             return None;
         }
         let landmarks = unmatched_landmarks(map, &candidate.group, frame);
-        search_local_map(sensor, &config.tracking, map, &landmarks, frame, &mut visible);
-        visible.extend(frame.sights.iter().flatten().filter_map(|sight| sight.landmark));
+        search_local_map(context, map, &landmarks, frame, &mut visible);
+        visible.extend(frame.matches.iter().flatten().filter_map(|matched| matched.landmark));
         visible.sort_unstable();
         visible.dedup();
         let projector = Projector::new(sensor, &frame.t_cam_world);
         let in_view = visible.iter().filter_map(|id| map.landmark(*id));
         expected = in_view.filter(|l| !is_hidden(c, &projector, frame, l)).map(Landmark::found_ratio).sum();
-        inliers = frame.refine_pose(sensor, &config.pose);
+        inliers = frame.refine_pose(context);
     }
     let projector = Projector::new(sensor, &frame.t_cam_world);
-    let alike = frame.sights.iter().zip(&frame.features.descriptors).filter(|(sight, seen)| {
-        let landmark = sight.and_then(|s| map.landmark(s.landmark?));
+    let alike = frame.matches.iter().zip(&frame.features.descriptors).filter(|(matched, seen)| {
+        let landmark = matched.and_then(|s| map.landmark(s.landmark?));
         landmark.is_some_and(|l| l.descriptor.distance(seen) <= c.max_distance && !is_hidden(c, &projector, frame, l))
     });
-    let evidence = Evidence { inliers, likeness: alike.count() as f64 / expected.max(1.0) };
+    let evidence = Evidence { inliers, match_ratio: alike.count() as f64 / expected.max(1.0) };
     let is_fixed = position_sigma_m(sensor, frame) <= c.max_position_sigma_m;
     (is_fixed && evidence.suffices(needed)).then_some(evidence)
 }
 
 /// How well the matches fix the camera's position, m.
 fn position_sigma_m(sensor: &SensorModel, frame: &TrackedFrame) -> f64 {
-    let matched =
-        frame.sights.iter().zip(&frame.features.features).filter_map(|(sight, feature)| Some(((*sight)?, feature)));
+    let matched = frame
+        .matches
+        .iter()
+        .zip(&frame.features.features)
+        .filter_map(|(matched, feature)| Some(((*matched)?, feature)));
     let observations: Vec<PoseObservation> = matched
-        .map(|(sight, feature)| PoseObservation {
-            point_world: sight.point_world,
+        .map(|(matched, feature)| PoseObservation {
+            point_world: matched.point_world,
             measurement: sensor.measurement(feature),
             trust: f64::from(feature.trust),
             inlier: true,
@@ -114,10 +117,10 @@ fn is_hidden(config: &PlaceConfig, projector: &Projector<'_>, frame: &TrackedFra
 
 /// Landmarks that the keyframes see and the frame is not matched to.
 fn unmatched_landmarks(map: &Map, keyframes: &[KeyFrameId], frame: &TrackedFrame) -> Vec<LandmarkId> {
-    let mut matched: Vec<LandmarkId> = frame.sights.iter().flatten().filter_map(|s| s.landmark).collect();
+    let mut matched: Vec<LandmarkId> = frame.matches.iter().flatten().filter_map(|s| s.landmark).collect();
     matched.sort_unstable();
     let mut landmarks: Vec<LandmarkId> =
-        keyframes.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.sights().map(|(_, l)| l)).collect();
+        keyframes.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.observed().map(|(_, l)| l)).collect();
     landmarks.sort_unstable();
     landmarks.dedup();
     landmarks.retain(|id| matched.binary_search(id).is_err());

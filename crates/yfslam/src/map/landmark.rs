@@ -34,7 +34,7 @@ pub struct Landmark {
     /// Frames in which it was found and fitted the pose.
     pub found: u32,
     /// Log-odds that it still stands where it was: up with each frame that found it, down with each that saw through it.
-    pub standing: f32,
+    pub existence_log_odds: f32,
     /// Mean colour at its features, red, green, blue.
     pub color: [u8; 3],
 }
@@ -42,17 +42,17 @@ pub struct Landmark {
 impl Landmark {
     /// Log-odds of a landmark that nothing speaks against, and the most that is kept: those of OctoMap's greatest probability, 0.97
     /// (Hornung et al., Autonomous Robots 2013).
-    pub const STANDS: f32 = 3.48;
+    pub const MAX_EXISTENCE_LOG_ODDS: f32 = 3.48;
     /// What a frame that found it adds: OctoMap's hit, 0.7.
-    pub(crate) const FOUND: f32 = 0.85;
+    pub(crate) const MATCHED_LOG_ODDS: f32 = 0.85;
     /// What a frame that saw through it adds: OctoMap's miss, 0.4.
-    pub(crate) const SEEN_THROUGH: f32 = -0.41;
+    pub(crate) const FREE_SPACE_LOG_ODDS: f32 = -0.41;
     /// Below, it is gone: OctoMap's least probability, 0.12.
-    pub(crate) const GONE: f32 = -1.99;
+    pub(crate) const MIN_EXISTENCE_LOG_ODDS: f32 = -1.99;
 
     /// Probability that it still stands where it was, as a share of that of a landmark that nothing speaks against.
     pub fn trust(&self) -> f32 {
-        (1.0 + (-Self::STANDS).exp()) / (1.0 + (-self.standing).exp())
+        (1.0 + (-Self::MAX_EXISTENCE_LOG_ODDS).exp()) / (1.0 + (-self.existence_log_odds).exp())
     }
 
     /// Of the frames that should have seen it, the share that did.
@@ -76,9 +76,9 @@ mod tests {
     fn a_landmark_that_is_seen_through_loses_trust_and_goes_unless_it_is_found_again() {
         let (scene, mut map) = (Scene::new(), Map::default());
         let first = scene.add(&mut map, 0, &scene.pose(0), &[]);
-        let ids: Vec<LandmarkId> = map.keyframe(first).unwrap().sights().map(|(_, id)| id).take(2).collect();
+        let ids: Vec<LandmarkId> = map.keyframe(first).unwrap().observed().map(|(_, id)| id).take(2).collect();
         for frame in 0..20 {
-            ids.iter().for_each(|id| map.note_seen_through(*id));
+            ids.iter().for_each(|id| map.count_free_space(*id));
             if frame % 2 == 1 {
                 map.count_found(ids[1]);
             }

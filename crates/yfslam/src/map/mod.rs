@@ -9,6 +9,7 @@
 //!    from two of them.
 //! 6. Loop edges are mutual; a keyframe with one stays in the map.
 
+pub mod container;
 mod keyframe;
 mod landmark;
 pub mod ops;
@@ -25,6 +26,10 @@ use slotmap::SlotMap;
 use crate::geometry::{Pose, Similarity, rigid, unscaled, with_scale};
 pub use keyframe::{KeyFrame, KeyFrameId};
 pub use landmark::{Landmark, LandmarkId};
+pub use persist::MapError;
+
+/// A keyframe and the pose of a frame relative to it, `t_cam_keyframe`: the frame follows every correction of the map.
+pub type KeyframeRelativePose = (KeyFrameId, Pose);
 
 /// Keyframes and landmarks, of one submap or several.
 #[derive(Clone, Debug, Default)]
@@ -79,12 +84,12 @@ impl Map {
 
     /// Current `s_cam_world` of a keyframe, removed or not, into the unit that it was mapped in.
     fn own_pose(&self, id: KeyFrameId) -> Option<Similarity> {
-        let (keyframe, s_asked_found) = self.standing(id)?;
+        let (keyframe, s_asked_found) = self.surviving_ancestor(id)?;
         Some(s_asked_found * with_scale(&keyframe.t_cam_world, 1.0 / keyframe.unit))
     }
 
     /// The keyframe or, if it was removed, the ancestor it was tied to, with `s_asked_found`.
-    pub fn standing(&self, id: KeyFrameId) -> Option<(&KeyFrame, Similarity)> {
+    pub fn surviving_ancestor(&self, id: KeyFrameId) -> Option<(&KeyFrame, Similarity)> {
         let (mut id, mut s_asked_id) = (id, Similarity::identity());
         loop {
             if let Some(keyframe) = self.keyframes.get(id) {
@@ -97,14 +102,14 @@ impl Map {
     }
 
     /// A frame's pose seen from a keyframe, `t_cam_reference`, in the unit that the keyframe was mapped in: when the map is corrected, its
-    /// scale included, the frame follows ([`Map::tied_pose`]).
-    pub fn tie(&self, reference: KeyFrameId, t_cam_world: &Pose) -> Option<Pose> {
+    /// scale included, the frame follows ([`Map::absolute_pose`]).
+    pub fn relative_pose(&self, reference: KeyFrameId, t_cam_world: &Pose) -> Option<Pose> {
         let own = self.own_pose(reference)?;
         Some((with_scale(t_cam_world, own.scaling()) * own.inverse()).isometry)
     }
 
     /// Current `t_cam_world` of a frame that was tied to a keyframe.
-    pub fn tied_pose(&self, reference: KeyFrameId, t_cam_reference: &Pose) -> Option<Pose> {
+    pub fn absolute_pose(&self, reference: KeyFrameId, t_cam_reference: &Pose) -> Option<Pose> {
         Some(rigid(&(unscaled(t_cam_reference) * self.own_pose(reference)?)))
     }
 
@@ -115,7 +120,7 @@ impl Map {
 
     /// Median depth of the landmarks that a keyframe sees; 0 if there are none.
     pub fn median_depth(&self, keyframe: &KeyFrame) -> f64 {
-        let landmarks = keyframe.sights().filter_map(|(_, id)| self.landmarks.get(id));
+        let landmarks = keyframe.observed().filter_map(|(_, id)| self.landmarks.get(id));
         let mut depths: Vec<f64> = landmarks.map(|l| (keyframe.t_cam_world * l.position).z).collect();
         let middle = depths.len() / 2;
         if depths.is_empty() { 0.0 } else { *depths.select_nth_unstable_by(middle, f64::total_cmp).1 }

@@ -53,7 +53,7 @@ impl Map {
             born,
             visible: 1,
             found: 1,
-            standing: Landmark::STANDS,
+            existence_log_odds: Landmark::MAX_EXISTENCE_LOG_ODDS,
             color,
         });
         self.add_observation(id, keyframe, feature);
@@ -187,15 +187,16 @@ impl Map {
     pub fn count_found(&mut self, landmark: LandmarkId) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.found += 1;
-            l.standing = (l.standing + Landmark::FOUND).min(Landmark::STANDS);
+            l.existence_log_odds =
+                (l.existence_log_odds + Landmark::MATCHED_LOG_ODDS).min(Landmark::MAX_EXISTENCE_LOG_ODDS);
         }
     }
 
     /// Notes a frame that saw through the landmark; one that is likely gone is removed.
-    pub fn note_seen_through(&mut self, landmark: LandmarkId) {
+    pub fn count_free_space(&mut self, landmark: LandmarkId) {
         let Some(l) = self.landmarks.get_mut(landmark) else { return };
-        l.standing += Landmark::SEEN_THROUGH;
-        if l.standing < Landmark::GONE {
+        l.existence_log_odds += Landmark::FREE_SPACE_LOG_ODDS;
+        if l.existence_log_odds < Landmark::MIN_EXISTENCE_LOG_ODDS {
             self.remove_landmark(landmark);
         }
     }
@@ -205,7 +206,7 @@ impl Map {
     pub fn update_covisibility(&mut self, keyframe: KeyFrameId) {
         let Some(k) = self.keyframes.get(keyframe) else { return };
         let mut seen: Vec<KeyFrameId> = k
-            .sights()
+            .observed()
             .filter_map(|(_, l)| self.landmarks.get(l))
             .flat_map(|l| l.observations.iter().map(|(other, _)| *other))
             .filter(|other| *other != keyframe)
@@ -256,8 +257,8 @@ impl Map {
     pub fn remove_keyframe(&mut self, keyframe: KeyFrameId) -> bool {
         let removable = self.keyframes.get(keyframe).filter(|k| k.loop_edges.is_empty());
         let Some(parent) = removable.and_then(|k| k.parent) else { return false };
-        let sights: Vec<LandmarkId> = self.keyframes[keyframe].sights().map(|(_, l)| l).collect();
-        for landmark in sights {
+        let matches: Vec<LandmarkId> = self.keyframes[keyframe].observed().map(|(_, l)| l).collect();
+        for landmark in matches {
             self.remove_observation(landmark, keyframe);
         }
         let (Some(own), Some(above)) = (self.own_pose(keyframe), self.own_pose(parent)) else { return false };
@@ -299,7 +300,7 @@ impl Map {
             }
         }
         for (id, k) in &self.keyframes {
-            for (f, l) in k.sights() {
+            for (f, l) in k.observed() {
                 if self.landmarks.get(l).and_then(|l| l.feature_in(id)) != Some(f) {
                     return Err(format!("feature {f} of {id:?} names {l:?}, which does not list it"));
                 }

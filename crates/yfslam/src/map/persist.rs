@@ -11,18 +11,15 @@ use crate::camera::Camera;
 use crate::config::{Config, FeatureConfig};
 use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds, OrbExtractor};
 use crate::geometry::Pose;
+use crate::map::container::{DENSE_MAP, MAP};
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::packed::{MAP, PIECES};
-
-/// Version that this code writes, and the only one it reads.
-pub const VERSION: u16 = MAP.version;
 
 /// Why bytes are no map that can be used.
-pub use crate::packed::PackedError as MapError;
+pub use crate::map::container::ContainerError as MapError;
 
 /// A map with what it was made with.
 #[derive(Clone, Debug)]
-pub struct SavedMap {
+pub struct MapParts {
     /// The map.
     pub map: Map,
     /// The camera that saw it.
@@ -46,7 +43,8 @@ pub(crate) struct CameraRecord {
     size: [u32; 2],
     intrinsics: [f64; 4],
     distortion: [f64; 5],
-    depth_factor: f64,
+    /// Depth units per metre in older files; they belong to the images now.
+    reserved: f64,
     fps: f64,
     bf: f64,
 }
@@ -97,8 +95,8 @@ pub fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Ve
 ///
 /// # Errors
 /// If the bytes are no map, of another version, cut, altered, or contradict themselves.
-pub fn decode(bytes: &[u8]) -> Result<SavedMap, MapError> {
-    let map = if PIECES.begins(bytes) { PIECES.split(bytes)?.1 } else { bytes };
+pub fn decode(bytes: &[u8]) -> Result<MapParts, MapError> {
+    let map = if DENSE_MAP.begins(bytes) { DENSE_MAP.split(bytes)?.1 } else { bytes };
     let records: Records = MAP.unpack(map)?;
     records.into_map().map_err(MapError::Records)
 }
@@ -145,7 +143,7 @@ impl Records {
         }
     }
 
-    fn into_map(self) -> Result<SavedMap, String> {
+    fn into_map(self) -> Result<MapParts, String> {
         let camera = self.camera.into_camera();
         let config = Config { features: self.features.clone(), ..Default::default() };
         config.validate().map_err(|error| error.to_string())?;
@@ -214,7 +212,7 @@ impl Records {
             map.update_covisibility(*id);
         }
         map.validate()?;
-        Ok(SavedMap { map, camera, features: self.features })
+        Ok(MapParts { map, camera, features: self.features })
     }
 }
 
@@ -252,7 +250,7 @@ impl CameraRecord {
             size: [camera.width as u32, camera.height as u32],
             intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy],
             distortion: camera.distortion,
-            depth_factor: camera.depth_factor,
+            reserved: 1.0,
             fps: camera.fps,
             bf: camera.bf,
         }
@@ -260,8 +258,12 @@ impl CameraRecord {
 
     pub fn into_camera(self) -> Camera {
         let ([width, height], [fx, fy, cx, cy]) = (self.size.map(|s| s as usize), self.intrinsics);
-        let Self { distortion, depth_factor, fps, bf, .. } = self;
-        Camera { width, height, fx, fy, cx, cy, distortion, depth_factor, fps, bf }
+        Camera {
+            distortion: self.distortion,
+            fps: self.fps,
+            bf: self.bf,
+            ..Camera::pinhole(width, height, fx, fy, cx, cy)
+        }
     }
 }
 
@@ -284,18 +286,7 @@ mod tests {
     use nalgebra::Vector6;
 
     fn camera() -> Camera {
-        Camera {
-            width: 640,
-            height: 480,
-            fx: 535.4,
-            fy: 539.2,
-            cx: 320.1,
-            cy: 247.6,
-            distortion: [0.1, -0.2, 0.001, 0.002, 0.0],
-            depth_factor: 5000.0,
-            fps: 30.0,
-            bf: 40.0,
-        }
+        Camera::pinhole(640, 480, 535.4, 539.2, 320.1, 247.6).with_distortion([0.1, -0.2, 0.001, 0.002, 0.0])
     }
 
     /// Four keyframes that see forty landmarks, one of them removed again.
@@ -378,7 +369,7 @@ mod tests {
         assert_eq!(decode(b"PK\x03\x04").unwrap_err(), MapError::Foreign(MAP.magic));
         let mut newer = bytes.clone();
         newer[MAP.magic.len()] = 9;
-        assert_eq!(decode(&newer).unwrap_err(), MapError::Version { magic: MAP.magic, found: 9, version: VERSION });
+        assert_eq!(decode(&newer).unwrap_err(), MapError::Version { magic: MAP.magic, found: 9, version: MAP.version });
         let announced = bytes.len() as u64;
         assert_eq!(decode(&bytes[..100]).unwrap_err(), MapError::Length { found: 100, announced });
     }

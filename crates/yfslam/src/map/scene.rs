@@ -5,9 +5,9 @@ use nalgebra::{Point3, Vector6};
 use super::{KeyFrameId, Map};
 use crate::camera::Camera;
 use crate::config::Config;
+use crate::context::SensorModel;
 use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds};
 use crate::geometry::{Pose, se3_exp};
-use crate::sensor::SensorModel;
 
 /// Points on a wavy wall, and the cameras that pass it.
 pub struct Scene {
@@ -17,18 +17,7 @@ pub struct Scene {
 
 /// The camera of the scene.
 pub fn camera() -> Camera {
-    Camera {
-        width: 640,
-        height: 480,
-        fx: 520.0,
-        fy: 510.0,
-        cx: 320.0,
-        cy: 240.0,
-        distortion: [0.0; 5],
-        depth_factor: 5000.0,
-        fps: 30.0,
-        bf: 40.0,
-    }
+    Camera::pinhole(640, 480, 520.0, 510.0, 320.0, 240.0)
 }
 
 impl Scene {
@@ -73,7 +62,7 @@ impl Scene {
                 let same = |(i, landmark): (usize, _)| {
                     (other.features.descriptors[i] == descriptors_of[feature]).then_some(landmark)
                 };
-                other.sights().find_map(same)
+                other.observed().find_map(same)
             });
             match known {
                 Some(landmark) => map.add_observation(landmark, id, feature),

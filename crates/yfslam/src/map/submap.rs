@@ -49,7 +49,7 @@ impl Map {
 
     /// Landmarks that the keyframes see, each once.
     pub fn landmarks_of(&self, keyframes: &[KeyFrameId]) -> Vec<LandmarkId> {
-        let seen = keyframes.iter().filter_map(|id| self.keyframes.get(*id)).flat_map(|k| k.sights());
+        let seen = keyframes.iter().filter_map(|id| self.keyframes.get(*id)).flat_map(|k| k.observed());
         let mut landmarks: Vec<LandmarkId> = seen.map(|(_, id)| id).collect();
         landmarks.sort_unstable();
         landmarks.dedup();
@@ -137,7 +137,7 @@ mod tests {
         for (k, id) in (3..7).zip(&second) {
             let keyframe = map.keyframe(*id).unwrap();
             assert!((keyframe.t_cam_world * scene.pose(k).inverse()).translation.vector.norm() < 1e-9);
-            for (feature, landmark) in keyframe.sights() {
+            for (feature, landmark) in keyframe.observed() {
                 let p = (keyframe.t_cam_world * map.landmark(landmark).unwrap().position).coords;
                 let [u, v] = scene.sensor.pinhole.project(&p);
                 let f = &keyframe.features.features[feature];
@@ -156,7 +156,7 @@ mod tests {
         let near = se3_exp(&Vector6::new(0.1, 0.05, -0.1, 0.02, 0.0, 0.01));
         // A frame that hangs on a keyframe that is removed, and keyframe and frame as they are before.
         let t_cam_world = near * map.keyframe_pose(second[1]).unwrap();
-        let tie = map.tie(second[1], &t_cam_world).unwrap();
+        let relative_pose = map.relative_pose(second[1], &t_cam_world).unwrap();
         let removed = map.keyframe_pose(second[1]).unwrap();
         assert!(map.remove_keyframe(second[1]));
         let own: Vec<_> =
@@ -169,10 +169,12 @@ mod tests {
             (s_first_second * center(before) - center(after)).norm() < 1e-9 && turned.angle_to(&after.rotation) < 1e-7
         };
         assert!(moved(&removed, &map.keyframe_pose(second[1]).unwrap()));
-        assert!(moved(&t_cam_world, &map.tied_pose(second[1], &tie).unwrap()));
+        assert!(moved(&t_cam_world, &map.absolute_pose(second[1], &relative_pose).unwrap()));
         // What is tied from now on is so in the unit that the keyframe was mapped in, too.
-        let now = map.tied_pose(second[1], &tie).unwrap();
-        assert!((map.tie(second[1], &now).unwrap() * tie.inverse()).translation.vector.norm() < 1e-9);
+        let now = map.absolute_pose(second[1], &relative_pose).unwrap();
+        assert!(
+            (map.relative_pose(second[1], &now).unwrap() * relative_pose.inverse()).translation.vector.norm() < 1e-9
+        );
         for (id, before) in &own {
             let after = map.landmark(*id).unwrap();
             assert!((s_first_second * before.position - after.position).norm() < 1e-9);

@@ -1,8 +1,8 @@
 //! What the map can do without (ORB-SLAM, IEEE T-RO 2015, sections VI-B and VI-E).
 
 use crate::config::MappingConfig;
+use crate::context::Context;
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::sensor::SensorModel;
 
 /// Removes young landmarks that are rarely found or seldom observed. Returns those still on probation after `keyframe`.
 pub fn young_landmarks(
@@ -29,20 +29,22 @@ pub fn young_landmarks(
 
 /// Removes covisible keyframes of `keyframe` of whose close landmarks nearly all are seen as finely by enough others. Without depth none
 /// is known to be close, and all count.
-pub fn redundant_keyframes(sensor: &SensorModel, config: &MappingConfig, map: &mut Map, keyframe: KeyFrameId) {
+pub fn redundant_keyframes(context: &Context, map: &mut Map, keyframe: KeyFrameId) {
+    let (_sensor, _config) = (&context.sensor, &context.config.mapping);
     let Some(k) = map.keyframe(keyframe) else { return };
     let candidates: Vec<KeyFrameId> = k.covisible.iter().map(|(id, _)| *id).collect();
     for candidate in candidates {
-        if is_redundant(sensor, config, map, candidate) {
+        if is_redundant(context, map, candidate) {
             map.remove_keyframe(candidate);
         }
     }
 }
 
-fn is_redundant(sensor: &SensorModel, config: &MappingConfig, map: &Map, candidate: KeyFrameId) -> bool {
+fn is_redundant(context: &Context, map: &Map, candidate: KeyFrameId) -> bool {
+    let (sensor, config) = (&context.sensor, &context.config.mapping);
     let Some(k) = map.keyframe(candidate) else { return false };
     let (mut total, mut redundant) = (0usize, 0usize);
-    for (i, id) in k.sights() {
+    for (i, id) in k.observed() {
         let Some(landmark) = map.landmark(id) else { continue };
         let f = &k.features.features[i];
         if sensor.measures_depth && f.depth_m.is_none_or(|z| f64::from(z) > sensor.close_limit_m) {

@@ -1,20 +1,14 @@
 //! Landmarks straight from the depth image (ORB-SLAM2, IEEE T-RO 2017, section III-D).
 
-use crate::config::MappingConfig;
+use crate::context::Context;
 use crate::image::RgbImage;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::mapping::color_at;
-use crate::sensor::SensorModel;
 
 /// Makes landmarks of the trusted features of `keyframe` that see none: all within the close limit, and the nearest of the others
 /// until `min_depth_landmarks` features with depth were looked at.
-pub fn new_landmarks(
-    sensor: &SensorModel,
-    config: &MappingConfig,
-    map: &mut Map,
-    keyframe: KeyFrameId,
-    color: &RgbImage,
-) -> Vec<LandmarkId> {
+pub fn new_landmarks(context: &Context, map: &mut Map, keyframe: KeyFrameId, color: &RgbImage) -> Vec<LandmarkId> {
+    let (sensor, config) = (&context.sensor, &context.config.mapping);
     let mut created = Vec::new();
     let Some(k) = map.keyframe(keyframe) else { return created };
     let t_world_cam = k.t_cam_world.inverse();

@@ -2,29 +2,30 @@
 //! section VI-C).
 
 use crate::config::Config;
+use crate::context::Context;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::optimize::residual::{CHI2_PIXEL, CHI2_PIXEL_DEPTH};
-use crate::sensor::SensorModel;
 use crate::tracking::search::{Best, Projector};
 
 /// Joins duplicates between `keyframe` and its first and second neighbours, both ways.
-pub fn duplicates(sensor: &SensorModel, config: &Config, map: &mut Map, keyframe: KeyFrameId) {
+pub fn duplicates(context: &Context, map: &mut Map, keyframe: KeyFrameId) {
+    let Context { sensor, config } = context;
     let targets = neighbourhood(config, map, keyframe);
     for &target in &targets {
         let own = landmarks_of(map, keyframe);
-        fuse_into(sensor, config, map, target, &own);
+        fuse_into(context, map, target, &own);
     }
     let mut theirs: Vec<LandmarkId> = targets.iter().flat_map(|&t| landmarks_of(map, t)).collect();
     theirs.sort_unstable();
     theirs.dedup();
-    fuse_into(sensor, config, map, keyframe, &theirs);
+    fuse_into(context, map, keyframe, &theirs);
     for id in landmarks_of(map, keyframe) {
         map.update_landmark(id, &sensor.scale_factors);
     }
 }
 
 fn landmarks_of(map: &Map, keyframe: KeyFrameId) -> Vec<LandmarkId> {
-    map.keyframe(keyframe).map(|k| k.sights().map(|(_, id)| id).collect()).unwrap_or_default()
+    map.keyframe(keyframe).map(|k| k.observed().map(|(_, id)| id).collect()).unwrap_or_default()
 }
 
 /// The best covisible keyframes and the best of each of those.
@@ -44,7 +45,8 @@ fn neighbourhood(config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<KeyFra
 }
 
 /// Projects landmarks into `target`: a feature that fits gets the landmark, or its own is merged with it.
-pub fn fuse_into(sensor: &SensorModel, config: &Config, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
+pub fn fuse_into(context: &Context, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
+    let Context { sensor, config } = context;
     let Some(k) = map.keyframe(target) else { return };
     let t_cam_world = k.t_cam_world;
     let projector = Projector::new(sensor, &t_cam_world);

@@ -9,11 +9,10 @@ pub(crate) mod fuse;
 mod triangulate;
 mod window;
 
-use crate::config::Config;
+use crate::context::{Context, SensorModel};
 use crate::image::RgbImage;
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::sensor::SensorModel;
-use crate::tracking::{StartFrame, TrackedFrame, TwoViewStart};
+use crate::tracking::{StartFrame, TrackedFrame, TwoViewMap};
 pub use window::Window;
 
 /// Grows and refines the map.
@@ -25,31 +24,25 @@ pub struct Mapper {
 
 impl Mapper {
     /// Takes a frame into the map and refines the surroundings. Returns the new keyframe.
-    pub fn insert(
-        &mut self,
-        sensor: &SensorModel,
-        config: &Config,
-        map: &mut Map,
-        frame: &TrackedFrame,
-        color: &RgbImage,
-    ) -> KeyFrameId {
-        let keyframe = self.add_keyframe(sensor, config, map, frame, color);
+    pub fn insert(&mut self, context: &Context, map: &mut Map, frame: &TrackedFrame, color: &RgbImage) -> KeyFrameId {
+        let Context { sensor, config } = context;
+        let keyframe = self.add_keyframe(context, map, frame, color);
         self.young = cull::young_landmarks(&config.mapping, map, keyframe, std::mem::take(&mut self.young));
-        self.young.extend(triangulate::new_landmarks(sensor, config, map, keyframe, color));
-        fuse::duplicates(sensor, config, map, keyframe);
+        self.young.extend(triangulate::new_landmarks(context, map, keyframe, color));
+        fuse::duplicates(context, map, keyframe);
         map.update_covisibility(keyframe);
         if map.keyframe_count() > 2
-            && let Some(mut window) = Window::copy(sensor, &config.mapping, map, keyframe)
+            && let Some(mut window) = Window::copy(context, map, keyframe)
         {
             window.adjust(&config.bundle);
             window.merge(sensor, map);
         }
-        cull::redundant_keyframes(sensor, &config.mapping, map, keyframe);
+        cull::redundant_keyframes(context, map, keyframe);
         keyframe
     }
 
     /// Begins a map, or a submap, with the two frames of a camera without depth. Returns the second keyframe.
-    pub fn begin(&mut self, sensor: &SensorModel, map: &mut Map, start: &TwoViewStart) -> KeyFrameId {
+    pub fn begin(&mut self, sensor: &SensorModel, map: &mut Map, start: &TwoViewMap) -> KeyFrameId {
         let [first, second] = [&start.first, &start.second].map(|StartFrame { frame, .. }| {
             map.insert_keyframe(frame.timestamp_ns, frame.t_cam_world, frame.features.clone())
         });
@@ -71,22 +64,16 @@ impl Mapper {
     }
 
     /// The keyframe itself, its observations and its landmarks from depth.
-    fn add_keyframe(
-        &mut self,
-        sensor: &SensorModel,
-        config: &Config,
-        map: &mut Map,
-        frame: &TrackedFrame,
-        color: &RgbImage,
-    ) -> KeyFrameId {
+    fn add_keyframe(&mut self, context: &Context, map: &mut Map, frame: &TrackedFrame, color: &RgbImage) -> KeyFrameId {
+        let Context { sensor, config: _ } = context;
         let keyframe = map.insert_keyframe(frame.timestamp_ns, frame.t_cam_world, frame.features.clone());
-        for (feature, sight) in frame.sights.iter().enumerate() {
-            if let Some(id) = sight.and_then(|s| s.landmark) {
+        for (feature, matched) in frame.matches.iter().enumerate() {
+            if let Some(id) = matched.and_then(|s| s.landmark) {
                 map.add_observation(id, keyframe, feature);
                 map.update_landmark(id, &sensor.scale_factors);
             }
         }
-        self.young.extend(depth::new_landmarks(sensor, &config.mapping, map, keyframe, color));
+        self.young.extend(depth::new_landmarks(context, map, keyframe, color));
         map.update_covisibility(keyframe);
         keyframe
     }

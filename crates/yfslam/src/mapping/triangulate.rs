@@ -2,27 +2,21 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::config::Config;
+use crate::context::Context;
 use crate::features::Feature;
 use crate::geometry::{Pose, midpoint, skew};
 use crate::image::RgbImage;
 use crate::map::{KeyFrame, KeyFrameId, LandmarkId, Map};
 use crate::mapping::color_at;
 use crate::optimize::residual::CHI2_PIXEL;
-use crate::sensor::SensorModel;
 use crate::tracking::search::Best;
 
 /// χ² with one degree of freedom: limit for the distance from the epipolar line.
 const CHI2_LINE: f64 = 3.84;
 
 /// Matches features without landmark between `keyframe` and its best covisible ones and triangulates them.
-pub fn new_landmarks(
-    sensor: &SensorModel,
-    config: &Config,
-    map: &mut Map,
-    keyframe: KeyFrameId,
-    color: &RgbImage,
-) -> Vec<LandmarkId> {
+pub fn new_landmarks(context: &Context, map: &mut Map, keyframe: KeyFrameId, color: &RgbImage) -> Vec<LandmarkId> {
+    let Context { sensor, config } = context;
     let mut created = Vec::new();
     let Some(k) = map.keyframe(keyframe) else { return created };
     let neighbours: Vec<KeyFrameId> =
@@ -38,9 +32,9 @@ pub fn new_landmarks(
         if t_b_a.translation.vector.norm() < min_baseline {
             continue;
         }
-        for (i, j) in match_along_epipolar_lines(sensor, config, a, b, &t_b_a) {
+        for (i, j) in match_along_epipolar_lines(context, a, b, &t_b_a) {
             let (Some(a), Some(b)) = (map.keyframe(keyframe), map.keyframe(neighbour)) else { break };
-            let Some(point) = triangulate(sensor, config, a, b, i, j) else { continue };
+            let Some(point) = triangulate(context, a, b, i, j) else { continue };
             let raw = a.features.features[i].raw;
             if let Some(id) = map.insert_landmark(point, keyframe, i, color_at(color, raw), &sensor.scale_factors) {
                 map.add_observation(id, neighbour, j);
@@ -58,13 +52,8 @@ fn open_features(k: &KeyFrame) -> Vec<usize> {
 }
 
 /// Pairs of feature indices (in a, in b) alike in descriptor and near each other's epipolar line.
-fn match_along_epipolar_lines(
-    sensor: &SensorModel,
-    config: &Config,
-    a: &KeyFrame,
-    b: &KeyFrame,
-    t_b_a: &Pose,
-) -> Vec<(usize, usize)> {
+fn match_along_epipolar_lines(context: &Context, a: &KeyFrame, b: &KeyFrame, t_b_a: &Pose) -> Vec<(usize, usize)> {
+    let Context { sensor, config } = context;
     let c = &sensor.pinhole;
     let k_inv = Matrix3::new(1.0 / c.fx, 0.0, -c.cx / c.fx, 0.0, 1.0 / c.fy, -c.cy / c.fy, 0.0, 0.0, 1.0);
     let rotation = *t_b_a.rotation.to_rotation_matrix().matrix();
@@ -96,14 +85,8 @@ fn match_along_epipolar_lines(
 }
 
 /// The world point of a match, if both views agree on it.
-fn triangulate(
-    sensor: &SensorModel,
-    config: &Config,
-    a: &KeyFrame,
-    b: &KeyFrame,
-    i: usize,
-    j: usize,
-) -> Option<Point3<f64>> {
+fn triangulate(context: &Context, a: &KeyFrame, b: &KeyFrame, i: usize, j: usize) -> Option<Point3<f64>> {
+    let Context { sensor, config } = context;
     let (f, g) = (&a.features.features[i], &b.features.features[j]);
     let (t_world_a, t_world_b) = (a.t_cam_world.inverse(), b.t_cam_world.inverse());
     let ray = |f: &Feature| sensor.pinhole.unproject(f64::from(f.u), f64::from(f.v), 1.0).coords;

@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::config::{BundleConfig, MappingConfig};
+use crate::config::BundleConfig;
+use crate::context::{Context, SensorModel};
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::optimize::schur::{BundleProblem, BundleSummary, Observation};
-use crate::sensor::SensorModel;
 
 /// A copied part of the map: keyframes to adjust, all they see, and keyframes that hold it in place.
 #[derive(Clone, Debug)]
@@ -18,14 +18,15 @@ pub struct Window {
 
 impl Window {
     /// Copies `keyframe`, its best covisible ones, their landmarks, and the keyframes outside that see most of those.
-    pub fn copy(sensor: &SensorModel, config: &MappingConfig, map: &Map, keyframe: KeyFrameId) -> Option<Self> {
+    pub fn copy(context: &Context, map: &Map, keyframe: KeyFrameId) -> Option<Self> {
+        let (sensor, config) = (&context.sensor, &context.config.mapping);
         let center = map.keyframe(keyframe)?;
         let mut keyframes = vec![keyframe];
         keyframes.extend(center.covisible.iter().take(config.window_keyframes.saturating_sub(1)).map(|(id, _)| *id));
         // The root defines the world: it is never adjusted.
         keyframes.retain(|id| map.keyframe(*id).is_some_and(|k| k.parent.is_some()));
         let mut landmarks: Vec<LandmarkId> =
-            keyframes.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.sights().map(|(_, l)| l)).collect();
+            keyframes.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.observed().map(|(_, l)| l)).collect();
         landmarks.sort_unstable();
         landmarks.dedup();
         let free_poses = keyframes.len();

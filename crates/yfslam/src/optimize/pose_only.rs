@@ -47,8 +47,14 @@ pub fn optimize_pose(
     inliers
 }
 
-/// Standard deviation of the camera's position at `t_cam_world`, m, as far as the noise of the inliers tells; infinite where they leave
-/// it open.
+/// Returns the covariance of a left perturbation (translation m, rotation rad) of `t_cam_world` that follows from the noise of the
+/// inliers, landmarks taken as exact; `None` where the inliers leave a direction open.
+pub fn pose_covariance(camera: &Pinhole, t_cam_world: &Pose, observations: &[PoseObservation]) -> Option<Matrix6<f64>> {
+    let (h, ..) = linearise(camera, false, t_cam_world, observations);
+    h.try_inverse().filter(|covariance| covariance.diagonal().iter().all(|variance| *variance >= 0.0))
+}
+
+/// Returns the standard deviation of the camera's position at `t_cam_world`, m; infinite where the inliers leave it open.
 pub fn position_sigma_m(camera: &Pinhole, t_cam_world: &Pose, observations: &[PoseObservation]) -> f64 {
     let (h, ..) = linearise(camera, false, t_cam_world, observations);
     // A left perturbation moves the camera by its translation part.

@@ -14,7 +14,7 @@ use crate::optimize::residual::{Measurement, huber, projection_jacobian};
 
 type Matrix6x3 = SMatrix<f64, 6, 3>;
 
-/// One sight of a point from a pose.
+/// One matched of a point from a pose.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation {
     /// Index into [`BundleProblem::poses`].

@@ -1,6 +1,7 @@
 //! What can be wrong with a setup or a frame.
 
 use crate::config::ConfigError;
+use crate::dense::DenseError;
 
 /// Why a system could not be set up.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +47,12 @@ pub enum SetupError {
         "the map was made by a camera without depth, in a unit of its own: use it with such a camera (--sensor mono, depth.source = \"motion\")"
     )]
     MapWithoutScale,
+    /// A dense map for a camera without depth images.
+    #[error("a dense map needs depth images: set depth.source to `image`, or leave the dense map out")]
+    DenseWithoutDepth,
+    /// A dense map that cannot be made or continued.
+    #[error(transparent)]
+    Dense(#[from] DenseError),
     /// A thread could not be started.
     #[error("a thread could not be started: {0}")]
     Thread(#[from] std::io::Error),
@@ -70,12 +77,18 @@ pub enum FrameRejected {
         /// The camera's height, px.
         camera_height: usize,
     },
-    /// Depth is to come from stereo, and there is no right picture.
+    /// Depth is to come from a depth image, and there is none.
     #[error(
-        "the frame has no right picture, but depth.source is `stereo`: give the frames of a stereo camera, or set depth.source to \
+        "the frame has no depth image, but depth.source is `image`: give the frames of an RGB-D camera, or set depth.source to `stereo` \
+         or `motion`"
+    )]
+    NoDepthImage,
+    /// Depth is to come from stereo, and there is no right image.
+    #[error(
+        "the frame has no right image, but depth.source is `stereo`: give the frames of a stereo camera, or set depth.source to \
          `image` or `motion`"
     )]
-    NoRightPicture,
+    NoRightImage,
     /// The clock did not advance.
     #[error(
         "the time stamp {timestamp_ns} ns does not come after {last_ns} ns, that of the last frame: the frame is repeated or late"

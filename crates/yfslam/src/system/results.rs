@@ -1,41 +1,69 @@
 //! What can be asked of the system between frames.
 
 use super::Slam;
-use crate::detection::Detection;
-use crate::dynamic::{MovingMask, Region, Things};
+use crate::dense::{DenseError, DenseView};
+use crate::detect::Detection;
+use crate::dynamic::Region;
+use crate::features::Feature;
 use crate::geometry::Pose;
-use crate::image::DepthImage;
-use crate::loops::LoopClosed;
+use crate::loops::LoopClosure;
 use crate::map::persist::{MapError, encode};
 use crate::map::{KeyFrameId, Map};
-use crate::tracking::TrackedFrame;
+
+/// Counts over all frames of a session.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Statistics {
+    /// Frames that were not rejected.
+    pub frames: usize,
+    /// Frames that should have become keyframes while the mapping thread was busy.
+    pub keyframes_skipped: usize,
+    /// Times that the map was begun anew because tracking was lost soon after the start. Earlier poses belong to another world.
+    pub resets: usize,
+    /// Frames on which the detector failed.
+    pub detector_failures: usize,
+    /// Frames in which nothing searched for people although the filter needs that.
+    pub frames_without_detector: usize,
+    /// Keyframe patches of the dense map.
+    pub dense_patches: usize,
+    /// Keyframe patches that were left out because the thread of the dense map was busy.
+    pub dense_patches_skipped: usize,
+    /// Memory of the keyframe patches, bytes.
+    pub dense_bytes: usize,
+}
 
 impl Slam {
-    /// Waits for mapping that is under way on its own thread, so that [`Slam::map`] and [`Slam::trajectory`] tell all. Returns the loop
-    /// that it closed.
-    pub fn settle(&mut self) -> Option<LoopClosed> {
-        self.owner.settle()?.loop_closed
+    /// Waits for mapping that is under way on its own thread, so that [`Slam::map`] and [`Slam::trajectory`] are complete. Returns the
+    /// loop that it closed.
+    pub fn finish_mapping(&mut self) -> Option<LoopClosure> {
+        self.owner.finish()?.loop_closure
     }
 
-    /// Frames that were worth a keyframe while mapping was busy on its own thread.
-    pub fn passed_over(&self) -> usize {
-        self.passed_over
+    /// Returns the counts of this session.
+    pub fn statistics(&self) -> Statistics {
+        let mut statistics = self.statistics;
+        if let Some(dense) = &self.dense {
+            statistics.dense_patches = dense.len();
+            statistics.dense_patches_skipped = dense.patches_skipped();
+            statistics.dense_bytes = dense.bytes();
+        }
+        statistics
     }
 
-    /// Poses of the tracked frames (world from camera) as the map has them now: of all frames, once every submap has been joined; else
-    /// of those in the submap that most of them are in.
+    /// Returns the poses of the tracked frames (time stamp in ns, world from camera) as the map has them now: of all frames, once every
+    /// submap has been merged; else of those in the submap that has most frames.
     pub fn trajectory(&self) -> Vec<(i64, Pose)> {
         self.trajectories().into_iter().max_by_key(Vec::len).unwrap_or_default()
     }
 
-    /// Poses of the tracked frames for each submap, each in its own world, in the order in which they were begun.
+    /// Returns the poses of the tracked frames for each submap, each in its own world, in the order in which they were begun.
     pub fn trajectories(&self) -> Vec<Vec<(i64, Pose)>> {
         let map = self.owner.map();
         let mut of_submaps: Vec<(KeyFrameId, Vec<(i64, Pose)>)> = Vec::new();
-        // Most frames hang on the keyframe that the one before hangs on.
+        // Most frames have the reference keyframe of the frame before.
         let mut last: Option<(KeyFrameId, usize)> = None;
         for a in &self.anchors {
-            let Some(t_cam_world) = map.tied_pose(a.reference, &a.t_cam_reference) else { continue };
+            let Some(t_cam_world) = map.absolute_pose(a.reference, &a.t_cam_reference) else { continue };
             let at = match last.filter(|(reference, _)| *reference == a.reference) {
                 Some((_, at)) => at,
                 None => {
@@ -53,72 +81,55 @@ impl Slam {
         of_submaps.into_iter().map(|(_, poses)| poses).collect()
     }
 
-    /// Whether the map can still grow: false once mapping on its own thread has ended by a panic.
+    /// Returns whether the map can still grow: false once mapping on its own thread has ended by a panic.
     pub fn is_mapping_alive(&self) -> bool {
         self.owner.is_alive()
     }
 
-    /// How often the map was begun anew because tracking was lost soon after the start. Poses given out before belong to another world.
-    pub fn resets(&self) -> usize {
-        self.resets
+    /// Returns the features of the last frame, with their depth and static probability.
+    pub fn features(&self) -> &[Feature] {
+        &self.tracker.current.features.features
     }
 
-    /// Frames on which the detector failed.
-    pub fn detector_failures(&self) -> usize {
-        self.detector_failures
+    /// Returns the detections of movable objects in the last frame, at any score.
+    pub fn detections(&self) -> &[Detection] {
+        &self.detections.movable
     }
 
-    /// The last frame: features with their trust, matches, pose.
-    pub fn last_frame(&self) -> &TrackedFrame {
-        &self.tracker.current
-    }
-
-    /// The boxes of movable objects in the last frame, at any score.
-    pub fn last_boxes(&self) -> &[Detection] {
-        &self.found.movable
-    }
-
-    /// The parts of the last frame that were found to move.
+    /// Returns the parts of the last frame that were found to move.
     pub fn moving_regions(&self) -> &[Region] {
         self.filter.regions()
     }
 
-    /// What moves in the last frame, whose depth image is given, pixel by pixel.
-    pub fn moving_mask(&self, depth: &DepthImage) -> MovingMask {
-        self.filter.moving_mask(&self.config.dynamic, depth)
-    }
-
-    /// Names of the detector's classes, in the order of [`Detection::class`]; none without one.
-    pub fn class_names(&self) -> &[String] {
-        &self.found.class_names
-    }
-
-    /// Whether the detector knows more than what can move.
-    pub fn knows_things(&self) -> bool {
-        self.found.knows_things()
-    }
-
-    /// Outlines of what the detector found in the last frame and cannot move, beside what does, as [`Slam::moving_mask`] has it of the
-    /// same depth image. `None` where no detector that knows such things looked.
-    pub fn things(&self, depth: &DepthImage, moving: &MovingMask) -> Option<Things> {
-        self.found.things().map(|boxes| Things::outline(&self.config.dynamic, boxes, depth, moving))
-    }
-
-    /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
+    /// Returns the sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
     pub fn first_keyframe(&self) -> u64 {
         self.first_keyframe
     }
 
-    /// The map as bytes, for [`crate::map::persist::decode`].
+    /// Returns the map: with mapping on its own thread, as it was after the last keyframe that is finished.
+    pub fn map(&self) -> &Map {
+        self.owner.map()
+    }
+
+    /// Returns the map as bytes, with the dense map if there is one, for [`SavedMap::from_bytes`](crate::SavedMap::from_bytes).
     ///
     /// # Errors
     /// If it cannot be written, which would be a fault of this program.
-    pub fn save_map(&self) -> Result<Vec<u8>, MapError> {
-        encode(self.map(), &self.sensor.camera, &self.config.features)
+    pub fn save_map(&mut self) -> Result<Vec<u8>, MapError> {
+        let mut bytes = match &mut self.dense {
+            Some(dense) => dense.snapshot(self.owner.map()).to_bytes()?,
+            None => Vec::new(),
+        };
+        bytes.extend(encode(self.map(), &self.context.sensor.camera, &self.context.config.features)?);
+        Ok(bytes)
     }
 
-    /// The map: with mapping on its own thread, as it was after the last keyframe that is finished.
-    pub fn map(&self) -> &Map {
-        self.owner.map()
+    /// Returns the dense map as it is now.
+    ///
+    /// # Errors
+    /// If the system was built without one.
+    pub fn dense(&mut self) -> Result<DenseView<'_>, DenseError> {
+        let mapper = self.dense.as_mut().ok_or(DenseError::Disabled)?;
+        Ok(DenseView::new(mapper, self.owner.map()))
     }
 }

@@ -1,9 +1,8 @@
 //! Whether a frame is worth a keyframe (ORB-SLAM2, IEEE T-RO 2017, section III-E).
 
-use crate::config::{KeyframeConfig, TrackingConfig};
+use crate::context::Context;
 use crate::map::{KeyFrameId, Map};
-use crate::sensor::SensorModel;
-use crate::tracking::frame::TrackedFrame;
+use crate::tracking::tracked_frame::TrackedFrame;
 
 /// What the decision is made from.
 #[derive(Clone, Copy, Debug)]
@@ -18,24 +17,23 @@ pub struct FrameSummary {
 
 /// Decides from the share of the reference keyframe's landmarks still tracked, and from close features not tracked.
 pub fn is_keyframe_wanted(
-    config: &KeyframeConfig,
-    tracking: &TrackingConfig,
-    sensor: &SensorModel,
+    context: &Context,
     map: &Map,
     reference: KeyFrameId,
     frame: &TrackedFrame,
     summary: FrameSummary,
 ) -> bool {
+    let (sensor, config, tracking) = (&context.sensor, &context.config.keyframes, &context.config.tracking);
     let known = map.submap_size(reference, 3);
     let few = known <= 2;
     let min_weight = if few { config.min_observation_weight.saturating_sub(1) } else { config.min_observation_weight };
     let reference_landmarks = map.keyframe(reference).map_or(0, |k| {
-        k.sights().filter_map(|(_, l)| map.landmark(l)).filter(|l| map.observation_weight(l) >= min_weight).count()
+        k.observed().filter_map(|(_, l)| map.landmark(l)).filter(|l| map.observation_weight(l) >= min_weight).count()
     });
     let (mut close_tracked, mut close_untracked) = (0, 0);
-    for (feature, sight) in frame.features.features.iter().zip(&frame.sights) {
+    for (feature, matched) in frame.features.features.iter().zip(&frame.matches) {
         if feature.trust > 0.0 && feature.depth_m.is_some_and(|z| f64::from(z) < sensor.close_limit_m) {
-            if sight.is_some_and(|s| s.landmark.is_some()) { close_tracked += 1 } else { close_untracked += 1 }
+            if matched.is_some_and(|s| s.landmark.is_some()) { close_tracked += 1 } else { close_untracked += 1 }
         }
     }
     let need_close = close_tracked < config.close_tracked && close_untracked > config.close_untracked;

@@ -6,7 +6,7 @@ use slotmap::SecondaryMap;
 
 use crate::config::TrackingConfig;
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::tracking::frame::TrackedFrame;
+use crate::tracking::tracked_frame::TrackedFrame;
 
 /// Keyframes and landmarks around the camera. Buffers are reused.
 #[derive(Clone, Debug, Default)]
@@ -26,8 +26,8 @@ impl LocalMap {
     pub fn update(&mut self, config: &TrackingConfig, map: &Map, frame: &TrackedFrame) -> Option<KeyFrameId> {
         self.update += 1;
         self.votes.clear();
-        for sight in frame.sights.iter().flatten() {
-            let Some(id) = sight.landmark else { continue };
+        for matched in frame.matches.iter().flatten() {
+            let Some(id) = matched.landmark else { continue };
             let Some(landmark) = map.landmark(id) else { continue };
             self.taken.insert(id, self.update);
             for &(keyframe, _) in &landmark.observations {
@@ -48,7 +48,7 @@ impl LocalMap {
         self.landmarks.clear();
         for &keyframe in &self.keyframes {
             let Some(keyframe) = map.keyframe(keyframe) else { continue };
-            for (_, id) in keyframe.sights() {
+            for (_, id) in keyframe.observed() {
                 if self.taken.insert(id, self.update) != Some(self.update) {
                     self.landmarks.push(id);
                 }

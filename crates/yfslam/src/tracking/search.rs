@@ -1,17 +1,17 @@
 //! Matching by projection (ORB-SLAM, IEEE T-RO 2015, sections V-B and V-D).
 //!
-//! In: a frame with a predicted pose, and points with descriptors. Out: new entries in the frame's `sights`. The inner loops are
+//! In: a frame with a predicted pose, and points with descriptors. Out: new entries in the frame's `matches`. The inner loops are
 //! compiled for each instruction set: without one that counts bits, Hamming distances take most of their time.
 
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use crate::config::{Config, TrackingConfig};
+use crate::context::{Context, SensorModel};
 use crate::features::Descriptor;
 use crate::features::matching::{RotationHistogram, two_nearest};
 use crate::map::{KeyFrame, LandmarkId, Map};
-use crate::sensor::SensorModel;
-use crate::tracking::frame::{Sight, TrackedFrame};
+use crate::tracking::tracked_frame::{Match, TrackedFrame};
 
 /// The camera pose in the form projection loops want.
 pub struct Projector<'a> {
@@ -110,36 +110,36 @@ impl Best {
 
 /// Matches the points of `last` around their projection into `current`. Returns the number of matches.
 pub fn search_last_frame(
-    sensor: &SensorModel,
-    config: &TrackingConfig,
+    context: &Context,
     last: &TrackedFrame,
     current: &mut TrackedFrame,
     radius_px: f32,
     rotation: &mut RotationHistogram,
 ) -> usize {
+    let (_sensor, _config) = (&context.sensor, &context.config.tracking);
     rotation.clear();
-    dispatch!(Level::new(), simd => match_last_frame(simd, sensor, config, last, current, radius_px, rotation));
-    rotation.for_each_outlier(|j| current.sights[j as usize] = None);
+    dispatch!(Level::new(), simd => match_last_frame(simd, context, last, current, radius_px, rotation));
+    rotation.for_each_outlier(|j| current.matches[j as usize] = None);
     current.matched()
 }
 
 #[inline(always)]
 fn match_last_frame<S: Simd>(
     _: S,
-    sensor: &SensorModel,
-    config: &TrackingConfig,
+    context: &Context,
     last: &TrackedFrame,
     current: &mut TrackedFrame,
     radius_px: f32,
     rotation: &mut RotationHistogram,
 ) {
+    let (sensor, config) = (&context.sensor, &context.config.tracking);
     let projector = Projector::new(sensor, &current.t_cam_world);
     let center_in_last = last.t_cam_world * projector.center_world;
     let baseline = sensor.baseline();
     let top = (sensor.levels() - 1) as u8;
-    for (i, sight) in last.sights.iter().enumerate() {
-        let Some(sight) = sight else { continue };
-        let Some(projection) = projector.project(&sight.point_world) else { continue };
+    for (i, matched) in last.matches.iter().enumerate() {
+        let Some(matched) = matched else { continue };
+        let Some(projection) = projector.project(&matched.point_world) else { continue };
         let seen = &last.features.features[i];
         let radius = radius_px * sensor.scale(seen.octave);
         // A camera that moved forward sees the point larger, hence at the same or a coarser level; backward alike.
@@ -159,7 +159,7 @@ fn match_last_frame<S: Simd>(
             }
         });
         if best.distance <= config.hamming_high {
-            current.sights[best.index] = Some(*sight);
+            current.matches[best.index] = Some(*matched);
             rotation.add(seen.angle_rad - current.features.features[best.index].angle_rad, best.index as u32);
         }
     }
@@ -175,7 +175,7 @@ pub fn search_keyframe(
 ) -> usize {
     rotation.clear();
     let candidates: Vec<u32> = (0..current.features.len()).filter(|&j| current.is_open(j)).map(|j| j as u32).collect();
-    for (i, id) in keyframe.sights() {
+    for (i, id) in keyframe.observed() {
         let Some(landmark) = map.landmark(id) else { continue };
         let [best, second] = two_nearest(&keyframe.features.descriptors[i], &current.features.descriptors, &candidates);
         let Some(best) = best else { continue };
@@ -183,11 +183,11 @@ pub fn search_keyframe(
         let distinct = (best.distance as f32) < config.reference_ratio * rival as f32;
         let j = best.index as usize;
         if best.distance <= config.hamming_low && distinct && current.is_open(j) {
-            current.sights[j] = Some(Sight::of(id, landmark));
+            current.matches[j] = Some(Match::of(id, landmark));
             rotation.add(keyframe.features.features[i].angle_rad - current.features.features[j].angle_rad, best.index);
         }
     }
-    rotation.for_each_outlier(|j| current.sights[j as usize] = None);
+    rotation.for_each_outlier(|j| current.matches[j as usize] = None);
     current.matched()
 }
 
@@ -251,26 +251,26 @@ fn match_first_frame<S: Simd>(
 
 /// Matches landmarks of the local map that the frame does not see yet. `visible` is refilled with those that lie in view.
 pub fn search_local_map(
-    sensor: &SensorModel,
-    config: &TrackingConfig,
+    context: &Context,
     map: &Map,
     landmarks: &[LandmarkId],
     current: &mut TrackedFrame,
     visible: &mut Vec<LandmarkId>,
 ) {
-    dispatch!(Level::new(), simd => match_local_map(simd, sensor, config, map, landmarks, current, visible));
+    let (_sensor, _config) = (&context.sensor, &context.config.tracking);
+    dispatch!(Level::new(), simd => match_local_map(simd, context, map, landmarks, current, visible));
 }
 
 #[inline(always)]
 fn match_local_map<S: Simd>(
     _: S,
-    sensor: &SensorModel,
-    config: &TrackingConfig,
+    context: &Context,
     map: &Map,
     landmarks: &[LandmarkId],
     current: &mut TrackedFrame,
     visible: &mut Vec<LandmarkId>,
 ) {
+    let (sensor, config) = (&context.sensor, &context.config.tracking);
     visible.clear();
     let projector = Projector::new(sensor, &current.t_cam_world);
     for &id in landmarks {
@@ -292,7 +292,7 @@ fn match_local_map<S: Simd>(
             * if cosine > 0.998 { config.local_radius_narrow_px } else { config.local_radius_px };
         let best = best_near(current, &projector, &projection, radius, octave, &landmark.descriptor);
         if best.is_distinct_in_octave(config.hamming_high, config.local_ratio) {
-            current.sights[best.index] = Some(Sight::of(id, landmark));
+            current.matches[best.index] = Some(Match::of(id, landmark));
         }
     }
 }

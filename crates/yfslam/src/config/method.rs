@@ -1,0 +1,47 @@
+//! The names of the dynamic filters, and how depth groups are found.
+
+use serde::{Deserialize, Serialize};
+
+/// The dynamic filter: which features are kept out of tracking and mapping.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Method {
+    /// Every feature is used, as in ORB-SLAM2.
+    None,
+    /// Every feature inside a bounding box is dropped.
+    Boxes,
+    /// YF-SLAM: inside a box, the depth group of the person is dropped and the background is kept.
+    #[serde(rename = "yf")]
+    YfSlam,
+    /// DS-SLAM: people are dropped while a feature on them violates the epipolar geometry.
+    #[serde(rename = "ds")]
+    DsSlam,
+    /// DynaSLAM: people are dropped, and what is nearer than earlier keyframes allow.
+    #[serde(rename = "dyna")]
+    DynaSlam,
+    /// DMS-SLAM: features whose motion differs from that of their neighbours are dropped; it uses no detector.
+    #[serde(rename = "dms")]
+    DmsSlam,
+    /// Our method: people are segmented in depth, and everything that has moved since the last seconds is dropped.
+    #[default]
+    Full,
+}
+
+impl Method {
+    /// Returns whether the filter uses bounding boxes of movable objects.
+    pub fn needs_boxes(self) -> bool {
+        !matches!(self, Self::None | Self::DmsSlam)
+    }
+}
+
+/// How the largest depth group in a box is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Grouping {
+    /// The paper's Geometric Depth RANSAC: pairs of depths are drawn from a seeded generator.
+    Ransac,
+    /// A sliding window over the sorted depths: always the largest group, without random draws.
+    #[default]
+    Exact,
+}

@@ -1,0 +1,134 @@
+//! Which keyframes show the place that an image shows.
+//!
+//! In: the features of an image, the index of landmarks. Out: groups of covisible keyframes that see the same landmarks, with the
+//! matches. As in a bag of words (Sivic and Zisserman, ICCV 2003), a feature that fits many keyframes says little.
+
+use slotmap::SecondaryMap;
+
+use super::descriptor_index::LandmarkIndex;
+use crate::config::PlaceConfig;
+use crate::features::FrameFeatures;
+use crate::map::{KeyFrameId, LandmarkId, Map};
+
+/// A place that may be the one in the image.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The keyframe that shares most with the image.
+    pub keyframe: KeyFrameId,
+    /// That keyframe and its covisible ones.
+    pub group: Vec<KeyFrameId>,
+    /// Features of the image with the landmark of the group that looks most alike.
+    pub matches: Vec<(u32, LandmarkId)>,
+}
+
+/// Recognises places. Buffers are reused.
+#[derive(Clone, Debug, Default)]
+pub struct PlaceRecogniser {
+    index: LandmarkIndex,
+    hits: Vec<Hit>,
+    votes: SecondaryMap<KeyFrameId, Vote>,
+    voted: Vec<KeyFrameId>,
+}
+
+/// A feature, the distance of its descriptor to that of a landmark, and the landmark.
+type Hit = (u32, u32, LandmarkId);
+
+#[derive(Clone, Copy, Debug)]
+struct Vote {
+    score: f64,
+    last_feature: u32,
+}
+
+impl PlaceRecogniser {
+    /// Enters the landmarks of a keyframe that other keyframes see too.
+    pub fn learn(&mut self, map: &Map, keyframe: KeyFrameId) {
+        let Some(keyframe) = map.keyframe(keyframe) else { return };
+        for (_, id) in keyframe.observed() {
+            if let Some(landmark) = map.landmark(id).filter(|l| l.observations.len() > 1) {
+                self.index.insert(id, &landmark.descriptor);
+            }
+        }
+        self.index.tidy(map);
+    }
+
+    /// Forgets all landmarks.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The places that most resemble an image, best first. Only trusted features count, and only landmarks that `may_count` lets.
+    pub fn candidates(
+        &mut self,
+        config: &PlaceConfig,
+        map: &Map,
+        features: &FrameFeatures,
+        may_count: impl Fn(LandmarkId) -> bool,
+    ) -> Vec<Candidate> {
+        self.hits.clear();
+        for (i, feature) in features.features.iter().enumerate() {
+            if feature.trust > 0.0 {
+                let from = self.hits.len();
+                let hits = &mut self.hits;
+                self.index.for_each_near(&features.descriptors[i], config.max_distance, |landmark, distance| {
+                    if may_count(landmark) {
+                        hits.push((i as u32, distance, landmark));
+                    }
+                });
+                hits[from..].sort_unstable();
+                hits.truncate(from + config.landmarks_per_feature);
+            }
+        }
+        self.vote(map);
+        let mut ranked: Vec<(KeyFrameId, f64)> = self.votes.iter().map(|(id, vote)| (id, vote.score)).collect();
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let mut candidates: Vec<Candidate> = Vec::new();
+        for (id, _) in ranked {
+            if candidates.len() >= config.candidates {
+                break;
+            }
+            let (Some(keyframe), false) = (map.keyframe(id), candidates.iter().any(|c| c.group.contains(&id))) else {
+                continue;
+            };
+            let covisible = keyframe.covisible.iter().take(config.group_keyframes).map(|(id, _)| *id);
+            let group: Vec<KeyFrameId> = std::iter::once(id).chain(covisible).collect();
+            let matches = self.matches(map, &group);
+            if matches.len() >= config.min_matches {
+                candidates.push(Candidate { keyframe: id, group, matches });
+            }
+        }
+        candidates
+    }
+
+    /// Each feature votes once for each keyframe that sees one of its landmarks, the more the fewer those are.
+    fn vote(&mut self, map: &Map) {
+        self.votes.clear();
+        let keyframes = map.keyframe_count() as f64;
+        for hits in self.hits.chunk_by(|a, b| a.0 == b.0) {
+            let feature = hits[0].0;
+            self.voted.clear();
+            for (id, _) in hits.iter().filter_map(|hit| map.landmark(hit.2)).flat_map(|l| &l.observations) {
+                let vote = Vote { score: 0.0, last_feature: u32::MAX };
+                let Some(entry) = self.votes.entry(*id) else { continue };
+                let vote = entry.or_insert(vote);
+                if vote.last_feature != feature {
+                    vote.last_feature = feature;
+                    self.voted.push(*id);
+                }
+            }
+            let weight = (1.0 + keyframes / self.voted.len() as f64).ln();
+            for &id in &self.voted {
+                self.votes[id].score += weight;
+            }
+        }
+    }
+
+    /// For each feature the nearest landmark that the group sees; of features with the same landmark, the nearest.
+    fn matches(&self, map: &Map, group: &[KeyFrameId]) -> Vec<(u32, LandmarkId)> {
+        let seen = |id| map.landmark(id).is_some_and(|l| l.observations.iter().any(|(k, _)| group.contains(k)));
+        let nearest = |hits: &[Hit]| hits.iter().find(|hit| seen(hit.2)).copied();
+        let mut matches: Vec<Hit> = self.hits.chunk_by(|a, b| a.0 == b.0).filter_map(nearest).collect();
+        matches.sort_unstable_by_key(|&(feature, distance, landmark)| (landmark, distance, feature));
+        matches.dedup_by_key(|hit| hit.2);
+        matches.into_iter().map(|(feature, _, landmark)| (feature, landmark)).collect()
+    }
+}

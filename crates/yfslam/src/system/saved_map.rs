@@ -1,0 +1,55 @@
+//! A map from an earlier session.
+
+use crate::camera::Camera;
+use crate::config::FeatureConfig;
+use crate::dense::DenseMap;
+use crate::map::Map;
+use crate::map::container::DENSE_MAP;
+use crate::map::persist::{MapError, MapParts, decode, encode};
+
+/// A map with what it was made with.
+#[derive(Clone, Debug)]
+pub struct SavedMap {
+    pub(crate) map: Map,
+    pub(crate) camera: Camera,
+    /// Feature settings: with others nothing would be recognised.
+    pub(crate) features: FeatureConfig,
+    pub(crate) dense: Option<DenseMap>,
+}
+
+impl SavedMap {
+    /// Reads a map, and the dense map that was saved with it if there is one, and checks both.
+    ///
+    /// # Errors
+    /// If the bytes are no map, of another version, cut, altered, or contradict themselves.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, MapError> {
+        let MapParts { map, camera, features } = decode(bytes)?;
+        let dense = DENSE_MAP.begins(bytes).then(|| DenseMap::from_bytes(bytes)).transpose()?;
+        Ok(Self { map, camera, features, dense })
+    }
+
+    /// Returns the map as bytes, for [`SavedMap::from_bytes`].
+    ///
+    /// # Errors
+    /// If it cannot be written, which would be a fault of this program.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, MapError> {
+        let mut bytes = self.dense.as_ref().map_or_else(|| Ok(Vec::new()), DenseMap::to_bytes)?;
+        bytes.extend(encode(&self.map, &self.camera, &self.features)?);
+        Ok(bytes)
+    }
+
+    /// Returns the keyframes and landmarks.
+    pub fn map(&self) -> &Map {
+        &self.map
+    }
+
+    /// Returns the camera that made the map.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Returns the dense map that was saved with it.
+    pub fn dense(&self) -> Option<&DenseMap> {
+        self.dense.as_ref()
+    }
+}
