@@ -83,7 +83,7 @@ impl Camera {
     }
 
     /// Pixel position with the lens distortion removed.
-    pub fn undistort_px(&self, u: f64, v: f64) -> [f64; 2] {
+    pub(crate) fn undistort_px(&self, u: f64, v: f64) -> [f64; 2] {
         if self.distortion == [0.0; 5] {
             return [u, v];
         }

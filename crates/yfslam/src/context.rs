@@ -10,7 +10,7 @@ use crate::optimize::residual::Measurement;
 
 /// The sensor model with the configuration it was resolved from, as the stages use it.
 #[derive(Clone, Debug)]
-pub struct Context {
+pub(crate) struct Context {
     /// The sensor model.
     pub sensor: SensorModel,
     /// The configuration, with the values of section `monocular` in place for a camera without depth.
@@ -19,7 +19,7 @@ pub struct Context {
 
 impl Context {
     /// Resolves the configuration for a camera; `scale_factors` are those of the extractor.
-    pub fn new(camera: &Camera, config: &Config, scale_factors: &[f32]) -> Self {
+    pub(crate) fn new(camera: &Camera, config: &Config, scale_factors: &[f32]) -> Self {
         let sensor = SensorModel::new(camera, config, scale_factors);
         Self { sensor, config: config.clone().for_sensor() }
     }
@@ -27,7 +27,7 @@ impl Context {
 
 /// Camera, pyramid and noise model, resolved from the configuration once.
 #[derive(Clone, Debug)]
-pub struct SensorModel {
+pub(crate) struct SensorModel {
     /// The calibration.
     pub camera: Camera,
     /// Its distortion-free part.
@@ -50,7 +50,7 @@ pub struct SensorModel {
 
 impl SensorModel {
     /// Resolves the configuration for a camera; `scale_factors` are those of the extractor.
-    pub fn new(camera: &Camera, config: &Config, scale_factors: &[f32]) -> Self {
+    pub(crate) fn new(camera: &Camera, config: &Config, scale_factors: &[f32]) -> Self {
         let pinhole = Pinhole::from(camera);
         // σ_z = n z² makes the disparity bf / z uncertain by bf·n, whatever the depth.
         let sigma_disparity = camera.bf * config.depth.noise_per_m;
@@ -77,24 +77,24 @@ impl SensorModel {
 
     /// Motion along the optical axis above which it tells how the scale of what is seen changes: the baseline of the depth sensor, m.
     /// Without one there is no length to compare with.
-    pub fn baseline(&self) -> f64 {
+    pub(crate) fn baseline(&self) -> f64 {
         if self.measures_depth { self.pinhole.bf / self.pinhole.fx } else { f64::INFINITY }
     }
 
     /// Number of pyramid levels.
-    pub fn levels(&self) -> usize {
+    pub(crate) fn levels(&self) -> usize {
         self.scale_factors.len()
     }
 
     /// Scale of a pyramid level.
     #[inline]
-    pub fn scale(&self, octave: u8) -> f32 {
+    pub(crate) fn scale(&self, octave: u8) -> f32 {
         self.scale_factors.get(usize::from(octave)).copied().unwrap_or(1.0)
     }
 
     /// The feature as the optimisers want it.
     #[inline]
-    pub fn measurement(&self, feature: &Feature) -> Measurement {
+    pub(crate) fn measurement(&self, feature: &Feature) -> Measurement {
         let depth = feature.depth_m.map(f64::from).filter(|z| *z < self.max_depth_m);
         let at_level = |weights: &[f64]| weights.get(usize::from(feature.octave)).copied().unwrap_or(0.0);
         Measurement {
@@ -108,7 +108,7 @@ impl SensorModel {
 
     /// The level at which a landmark should be found from `distance_m`, given its `max_distance_m` (ORB-SLAM, IEEE T-RO 2015, V-D).
     #[inline]
-    pub fn predict_octave(&self, max_distance_m: f64, distance_m: f64) -> u8 {
+    pub(crate) fn predict_octave(&self, max_distance_m: f64, distance_m: f64) -> u8 {
         let ratio = (max_distance_m / distance_m) as f32;
         // The first level whose scale reaches the ratio; a handful of comparisons beat a logarithm.
         self.scale_factors.iter().position(|s| *s >= ratio).unwrap_or(self.levels().saturating_sub(1)) as u8

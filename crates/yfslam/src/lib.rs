@@ -51,6 +51,7 @@
 //! assert!(tracked.t_world_cam.is_none(), "a blank picture starts no map");
 //! # Ok(()) }
 //! ```
+#![deny(unreachable_pub)]
 #![warn(missing_docs)]
 
 mod backend;
@@ -63,13 +64,14 @@ mod dynamic;
 mod features;
 mod frame;
 mod geometry;
-pub mod image;
+mod image;
 mod loops;
 mod map;
 mod mapping;
 mod optimize;
 mod system;
 mod tracking;
+pub mod unstable;
 mod worker;
 
 pub use nalgebra;
@@ -87,9 +89,3 @@ pub use map::{KeyFrame, KeyFrameId, KeyframeRelativePose, Landmark, LandmarkId, 
 pub use system::{FrameRejected, MapUse, SavedMap, SetupError, Slam, SlamBuilder, StageTimes, Statistics, Tracked};
 pub use tracking::{LostReason, TrackingState};
 pub use worker::{Execution, Worker};
-
-/// Parts for those who measure the system itself; they may change in any release.
-pub mod unstable {
-    pub use crate::features::{Descriptor, Features, KeyPoint, OrbExtractor};
-    pub use crate::image::{GrayImage, gray_from_rgb};
-}

@@ -136,7 +136,7 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
     }
 
     /// Returns whether the worker can take requests; a panic that was not yet noticed does not count.
-    pub fn is_alive(&self) -> bool {
+    pub(crate) fn is_alive(&self) -> bool {
         self.requests.is_some()
     }
 

@@ -46,7 +46,7 @@ struct Answer {
 }
 
 /// A backend on a thread of its own, as tracking uses it.
-pub struct MappingWorker {
+pub(crate) struct MappingWorker {
     worker: Worker<Request, Answer>,
     pub(super) recogniser: Arc<Mutex<PlaceRecogniser>>,
     pub(super) snapshot: Arc<Map>,

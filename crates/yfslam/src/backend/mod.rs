@@ -20,7 +20,7 @@ use mapping_worker::MappingWorker;
 
 /// What the insertion of a keyframe led to.
 #[derive(Clone, Debug)]
-pub struct Inserted {
+pub(crate) struct Inserted {
     /// The keyframe.
     pub keyframe: KeyFrameId,
     /// The loop that it closed.
@@ -33,7 +33,7 @@ pub struct Inserted {
 
 /// The map and everything that changes it.
 #[derive(Clone, Debug)]
-pub struct Backend {
+pub(crate) struct Backend {
     context: Arc<Context>,
     map: Map,
     mapper: Mapper,
@@ -43,7 +43,7 @@ pub struct Backend {
 
 impl Backend {
     /// Takes a map over and enters its keyframes for place recognition.
-    pub fn new(context: Arc<Context>, map: Map) -> Self {
+    pub(crate) fn new(context: Arc<Context>, map: Map) -> Self {
         let mut recogniser = PlaceRecogniser::default();
         for (id, _) in map.keyframes() {
             recogniser.learn(&map, id);
@@ -103,7 +103,7 @@ impl Backend {
 }
 
 /// The owner of the map, on the calling thread or on its own.
-pub enum MapOwner {
+pub(crate) enum MapOwner {
     /// On the calling thread.
     Inline(Box<Backend>),
     /// On its own thread.
@@ -115,7 +115,7 @@ impl MapOwner {
     ///
     /// # Errors
     /// If the operating system grants no thread.
-    pub fn new(backend: Backend, execution: Execution) -> std::io::Result<Self> {
+    pub(crate) fn new(backend: Backend, execution: Execution) -> std::io::Result<Self> {
         Ok(match execution {
             Execution::Inline => Self::Inline(Box::new(backend)),
             Execution::Threaded => Self::Threaded(MappingWorker::spawn(backend)?),
@@ -123,7 +123,7 @@ impl MapOwner {
     }
 
     /// The map: as it is, or as it was after the last keyframe that is finished.
-    pub fn map(&self) -> &Map {
+    pub(crate) fn map(&self) -> &Map {
         match self {
             Self::Inline(backend) => &backend.map,
             Self::Threaded(worker) => &worker.snapshot,
@@ -131,7 +131,7 @@ impl MapOwner {
     }
 
     /// Place recognition.
-    pub fn recogniser(&self) -> Arc<Mutex<PlaceRecogniser>> {
+    pub(crate) fn recogniser(&self) -> Arc<Mutex<PlaceRecogniser>> {
         match self {
             Self::Inline(backend) => backend.recogniser(),
             Self::Threaded(worker) => Arc::clone(&worker.recogniser),
@@ -139,7 +139,7 @@ impl MapOwner {
     }
 
     /// Returns whether a keyframe would be taken now.
-    pub fn is_free(&self) -> bool {
+    pub(crate) fn is_free(&self) -> bool {
         match self {
             Self::Inline(_) => true,
             Self::Threaded(worker) => !worker.busy,
@@ -148,7 +148,7 @@ impl MapOwner {
 
     /// Hands a keyframe over. Returns the result if it is known at once. The first keyframe of a submap is waited for: without it no
     /// frame can be tracked there.
-    pub fn insert(&mut self, frame: &TrackedFrame, color: &Arc<RgbImage>, is_first: bool) -> Option<Inserted> {
+    pub(crate) fn insert(&mut self, frame: &TrackedFrame, color: &Arc<RgbImage>, is_first: bool) -> Option<Inserted> {
         match self {
             Self::Inline(backend) => {
                 let mut inserted = backend.insert(frame, color);
@@ -167,7 +167,7 @@ impl MapOwner {
     }
 
     /// Begins the map of a camera without depth, and waits for it. Returns what the second keyframe led to.
-    pub fn begin(&mut self, start: TwoViewMap) -> Option<Inserted> {
+    pub(crate) fn begin(&mut self, start: TwoViewMap) -> Option<Inserted> {
         match self {
             Self::Inline(backend) => Some(backend.begin(&start)),
             Self::Threaded(worker) => {
@@ -178,7 +178,7 @@ impl MapOwner {
     }
 
     /// Returns what a keyframe handed over earlier led to, if that is known by now.
-    pub fn poll(&mut self) -> Option<Inserted> {
+    pub(crate) fn poll(&mut self) -> Option<Inserted> {
         match self {
             Self::Inline(_) => None,
             Self::Threaded(worker) => worker.poll(),
@@ -186,7 +186,7 @@ impl MapOwner {
     }
 
     /// Waits until every keyframe handed over is in the map, and the map is adjusted after the last loop.
-    pub fn finish(&mut self) -> Option<Inserted> {
+    pub(crate) fn finish(&mut self) -> Option<Inserted> {
         match self {
             Self::Inline(_) => None,
             Self::Threaded(worker) => worker.finish(),
@@ -194,7 +194,7 @@ impl MapOwner {
     }
 
     /// Counts which landmarks a frame had in view and which it matched; takes them out of `counts`.
-    pub fn count(&mut self, counts: &mut ObservationCounts) {
+    pub(crate) fn count(&mut self, counts: &mut ObservationCounts) {
         match self {
             Self::Inline(backend) => {
                 backend.count(counts);
@@ -205,7 +205,7 @@ impl MapOwner {
     }
 
     /// Returns whether the map can still grow: false once a thread of its own has ended by a panic.
-    pub fn is_alive(&self) -> bool {
+    pub(crate) fn is_alive(&self) -> bool {
         match self {
             Self::Inline(_) => true,
             Self::Threaded(worker) => worker.is_alive(),
@@ -213,7 +213,7 @@ impl MapOwner {
     }
 
     /// Removes the submap with that root.
-    pub fn remove_submap(&mut self, root: KeyFrameId) {
+    pub(crate) fn remove_submap(&mut self, root: KeyFrameId) {
         match self {
             Self::Inline(backend) => backend.map.remove_submap(root),
             Self::Threaded(worker) => worker.remove_submap(root),
@@ -221,7 +221,7 @@ impl MapOwner {
     }
 
     /// Begins anew with an empty map.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         match self {
             Self::Inline(backend) => backend.reset(),
             Self::Threaded(worker) => worker.reset(),

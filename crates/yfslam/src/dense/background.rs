@@ -98,11 +98,11 @@ pub struct Backgrounds<'a> {
 }
 
 impl<'a> Backgrounds<'a> {
-    /// DepthHistory of a dense_map with its volume. `told` hears how many patches are looked through.
-    pub fn new(dense_map: &'a DenseMap, volume: &'a Volume, mut told: impl FnMut(usize)) -> Self {
+    /// DepthHistory of a dense_map with its volume. `progress` hears how many patches are looked through.
+    pub fn new(dense_map: &'a DenseMap, volume: &'a Volume, mut progress: impl FnMut(usize)) -> Self {
         let mut besides = Vec::with_capacity(dense_map.patches.len());
         for (number, one) in dense_map.patches.iter().enumerate() {
-            told(number);
+            progress(number);
             let shown = |t_map_cam: Isometry3<f32>| beside(volume, &t_map_cam, &dense_map.grid, &one.patch);
             besides.push(volume.pose(number).map(|pose| shown(pose.cast())).unwrap_or_default());
         }
@@ -117,7 +117,8 @@ impl<'a> Backgrounds<'a> {
     }
 
     /// The view of a frame that is none of the dense_map's patches, from `t_world_cam`: `own` is cut from it on the same cells.
-    pub fn of_frame(&self, own: &KeyframePatch, t_world_cam: &Pose) -> Background {
+    #[cfg(test)]
+    pub(crate) fn of_frame(&self, own: &KeyframePatch, t_world_cam: &Pose) -> Background {
         let sources = self.sources(t_world_cam, None);
         let t_map_view = sources.first().map(|source| source.t_map_source * source.t_view_source.inverse());
         let beside = t_map_view.map(|t_map_view| beside(self.volume, &t_map_view, &self.dense_map.grid, own));
@@ -307,7 +308,7 @@ mod tests {
         }
         let dense_map =
             DenseMap::of_poses(grid.clone(), [(Pose::identity(), marked.clone()), (Pose::identity(), other)]);
-        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {}).unwrap();
         let seen = Backgrounds::new(&dense_map, &volume, |_| {}).of_patch(0).unwrap();
         let known = |column: usize, row: usize| seen.valid.data()[row * columns + column];
         assert!(known(half - 1, 30) && known(half + 4, 30) && known(columns - 1, 30), "the wall goes on");
@@ -333,7 +334,7 @@ mod tests {
         own.depth.iter_mut().filter(|d| **d < 3000).for_each(|d| *d |= 1 << 15);
         let patches = [(Pose::identity(), own.clone()), (moved, other)];
         let dense_map = DenseMap::of_poses(grid.clone(), patches);
-        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {}).unwrap();
         let views = Backgrounds::new(&dense_map, &volume, |_| {});
         let seen = views.of_patch(0).unwrap();
         assert_eq!(seen, views.of_frame(&own, &Pose::identity()), "it need not be one of the patches");

@@ -25,12 +25,12 @@ struct Held {
     log_odds: f32,
 }
 
-/// The classes of a dense_map. `told` hears how many patches are done.
-pub fn classes(dense_map: &DenseMap, volume: &Volume, mut told: impl FnMut(usize)) -> Classes {
+/// The classes of a dense_map. `progress` hears how many patches are done.
+pub fn classes(dense_map: &DenseMap, volume: &Volume, mut progress: impl FnMut(usize)) -> Classes {
     let mut classes = Classes::default();
     let mut seen = Vec::new();
     for (number, one) in dense_map.patches.iter().enumerate() {
-        told(number);
+        progress(number);
         let Some(pose) = volume.pose(number).filter(|_| !one.patch.class.is_empty()) else { continue };
         readings(dense_map, one, &pose.cast(), volume.config(), &mut seen);
         seen.sort_unstable();
@@ -99,7 +99,7 @@ mod tests {
     use crate::geometry::Pose;
 
     /// A thing at 1.52 m that patches take for these classes, before a wall; `None` where nobody looked.
-    fn held(told: &[Option<u8>]) -> (u8, u8) {
+    fn held(progress: &[Option<u8>]) -> (u8, u8) {
         let config = DenseConfig::default();
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
         let patch = |class: Option<u8>| -> KeyframePatch {
@@ -110,8 +110,9 @@ mod tests {
             let cells: Vec<u8> = of_cells.by_ref().take(grid.rays().len()).collect();
             KeyframePatch { class: cells, ..patch }
         };
-        let dense_map = DenseMap::of_poses(grid.clone(), told.iter().map(|class| (Pose::identity(), patch(*class))));
-        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let dense_map =
+            DenseMap::of_poses(grid.clone(), progress.iter().map(|class| (Pose::identity(), patch(*class))));
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {}).unwrap();
         let classes = classes(&dense_map, &volume, |_| {});
         let at = |z: f32| classes.get(voxel_at(&Point3::new(0.01, 0.01, z), 20.0));
         (at(1.52), at(3.01))

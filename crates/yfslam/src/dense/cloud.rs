@@ -28,13 +28,13 @@ struct Sum {
     count: u32,
 }
 
-/// The cloud of a dense_map, ordered by block, then by place in it. `told` hears how many patches are done.
-pub fn cloud(dense_map: &DenseMap, volume: &Volume, mut told: impl FnMut(usize)) -> Vec<CloudPoint> {
+/// The cloud of a dense_map, ordered by block, then by place in it. `progress` hears how many patches are done.
+pub fn cloud(dense_map: &DenseMap, volume: &Volume, mut progress: impl FnMut(usize)) -> Vec<CloudPoint> {
     let config = volume.config();
     let per_m = 1.0 / config.resolution_m;
     let mut sums: BTreeMap<Block, Vec<Sum>> = BTreeMap::new();
     for (number, one) in dense_map.patches.iter().enumerate() {
-        told(number);
+        progress(number);
         let Some(pose) = volume.pose(number) else { continue };
         let pose: Isometry3<f32> = pose.cast();
         for (p, color) in one.patch.points(&dense_map.grid, config.max_range_m) {
@@ -58,13 +58,13 @@ pub fn cloud(dense_map: &DenseMap, volume: &Volume, mut told: impl FnMut(usize))
 }
 
 /// Bytes of memory that the sums of a cloud take.
-pub fn bytes(volume: &Volume) -> usize {
+pub(crate) fn bytes(volume: &Volume) -> usize {
     let shows_surface = |block: &Block| volume.voxels_in(*block).any(|known| known.occupied);
     volume.blocks().filter(shows_surface).count() * VOXELS * size_of::<Sum>()
 }
 
 /// Occupied voxels among the 26 around one.
-pub fn neighbours(volume: &Volume, [x, y, z]: Voxel) -> usize {
+pub(crate) fn neighbours(volume: &Volume, [x, y, z]: Voxel) -> usize {
     let around = (0..27).filter(|i| *i != 13).map(|i| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]);
     around.filter(|voxel| volume.is_occupied(*voxel)).count()
 }
@@ -103,7 +103,7 @@ mod tests {
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
         let patch = scene::wall(&grid, 2.01, None);
         let dense_map = DenseMap::of_poses(grid, [(Pose::identity(), patch)]);
-        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {}).unwrap();
         let points = cloud(&dense_map, &volume, |_| {});
         assert!(points.iter().all(|p| (p.position_m[2] - 2.01).abs() < 1e-3 && p.color == [120, 130, 140]));
         let mut voxels: Vec<_> = points.iter().map(|p| p.voxel).collect();

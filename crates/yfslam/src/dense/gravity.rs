@@ -15,13 +15,33 @@ const LAYER_M: f64 = 0.03;
 /// Points that are asked at most.
 const POINTS: usize = 20_000;
 
+/// Which direction of the world becomes the z-axis of a dense map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Up {
+    /// The direction along which most level surfaces were measured, within 30° of that of the first image.
+    Level,
+    /// The direction that points up in an upright first image.
+    Camera,
+    /// A given direction in the world of the keyframes.
+    Direction(Vector3<f64>),
+}
+
+/// Returns the rotation after which the z-axis of the world points up.
+pub(crate) fn turn(dense_map: &DenseMap, up: Up) -> UnitQuaternion<f64> {
+    match up {
+        Up::Level => of_dense_map(dense_map),
+        Up::Camera => of_camera(),
+        Up::Direction(direction) => from_up(&direction),
+    }
+}
+
 /// Up as in a picture taken upright: camera x right, y down, z forward become y negative, z negative, x.
-pub fn of_camera() -> UnitQuaternion<f64> {
+pub(crate) fn of_camera() -> UnitQuaternion<f64> {
     from_up(&-Vector3::y())
 }
 
 /// The rotation that turns direction `up` of the world to z, and the world's z-axis, as far as it is level, to x.
-pub fn from_up(up: &Vector3<f64>) -> UnitQuaternion<f64> {
+pub(crate) fn from_up(up: &Vector3<f64>) -> UnitQuaternion<f64> {
     let z = up.try_normalize(1e-9).unwrap_or(-Vector3::y());
     let level = |v: Vector3<f64>| (v - z * z.dot(&v)).try_normalize(0.1);
     let x = level(Vector3::z()).or_else(|| level(Vector3::x())).unwrap_or(Vector3::x());
@@ -30,7 +50,7 @@ pub fn from_up(up: &Vector3<f64>) -> UnitQuaternion<f64> {
 }
 
 /// Up by the level surfaces that the patches show; that of the first picture if they show none.
-pub fn of_dense_map(dense_map: &DenseMap) -> UnitQuaternion<f64> {
+pub(crate) fn of_dense_map(dense_map: &DenseMap) -> UnitQuaternion<f64> {
     let points = sample(dense_map);
     let first = dense_map.patches.first().map_or(-Vector3::y(), |patch| patch.t_world_cam * -Vector3::y());
     let mut best = (levelness(&points, &first), first);
@@ -60,7 +80,7 @@ pub fn of_dense_map(dense_map: &DenseMap) -> UnitQuaternion<f64> {
 
 /// Height above which hardly anything is and below which hardly anything: the floor, m along the z-axis of a turned world. The lowest
 /// layer with at least a tenth of the fullest one's points.
-pub fn floor_m(dense_map: &DenseMap, turned: &UnitQuaternion<f64>) -> Option<f64> {
+pub(crate) fn floor_m(dense_map: &DenseMap, turned: &UnitQuaternion<f64>) -> Option<f64> {
     let points: Vec<_> = sample(dense_map).into_iter().map(|p| turned * p).collect();
     let counts = layers(&points, &Vector3::z());
     let most = counts.values().max()?;

@@ -80,7 +80,7 @@ mod tests {
         let patch = scene::wall(&grid, 2.02, None);
         let dense_map = DenseMap::of_poses(grid, [(Pose::identity(), patch)]);
         let turn: UnitQuaternion<f64> = gravity::of_camera();
-        let volume = dense_map.volume(&config, &turn, |_| {});
+        let volume = dense_map.volume(&config, &turn, |_| {}).unwrap();
         let ground = ground_grid(&volume, [-0.3, 0.3]);
         let at = |x: f64, y: f64| {
             let [column, row] = [(x, 0), (y, 1)].map(|(v, axis)| ((v - ground.origin_m[axis]) / 0.05).floor() as usize);

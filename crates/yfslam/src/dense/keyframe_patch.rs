@@ -44,22 +44,22 @@ impl CellGrid {
     }
 
     /// Cells per row.
-    pub fn columns(&self) -> usize {
+    pub(crate) fn columns(&self) -> usize {
         self.columns
     }
 
     /// Rows of cells.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 
     /// Pixels along each side of a cell.
-    pub fn stride_px(&self) -> usize {
+    pub(crate) fn stride_px(&self) -> usize {
         self.stride_px
     }
 
     /// The camera.
-    pub fn camera(&self) -> &Camera {
+    pub(crate) fn camera(&self) -> &Camera {
         &self.camera
     }
 
@@ -94,7 +94,7 @@ impl CellGrid {
 
 /// What a cell measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
+pub(crate) struct Reading {
     /// Depth along the optical axis, m.
     pub depth_m: f32,
     /// Whether the surface moves: space before it is free, but it stays out of the map.
@@ -135,27 +135,28 @@ impl KeyframePatch {
     }
 
     /// The patch of depths, m (0 where nothing was measured), that are exact and stand still, of one colour.
-    pub fn of_depths(depths_m: impl IntoIterator<Item = f32>, color: [u8; 3]) -> Self {
+    #[cfg(test)]
+    pub(crate) fn of_depths(depths_m: impl IntoIterator<Item = f32>, color: [u8; 3]) -> Self {
         let units = |z: f32| ((z / UNIT_M + 0.5) as u16).min(MOVING - 1);
         let depth: Vec<u16> = depths_m.into_iter().map(units).collect();
         Self { color: vec![color; depth.len()], depth, class: Vec::new() }
     }
 
     /// The patch with classes: `class(position)` is that of what a position of the image, px, shows; 0 where that is unknown.
-    pub fn with_classes(mut self, grid: &CellGrid, class: impl Fn([f32; 2]) -> u8) -> Self {
+    pub(crate) fn with_classes(mut self, grid: &CellGrid, class: impl Fn([f32; 2]) -> u8) -> Self {
         let of_cell = |cell| self.surface_m(cell).map_or(0, |_| class(grid.middle_px(cell)));
         self.class = (0..self.depth.len()).map(of_cell).collect();
         self
     }
 
     /// Bytes of memory that it takes.
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         size_of_val(&*self.depth) + size_of_val(&*self.color) + self.class.len()
     }
 
     /// What a cell measured; `None` where there is no depth.
     #[inline]
-    pub fn reading(&self, cell: usize) -> Option<Reading> {
+    pub(crate) fn reading(&self, cell: usize) -> Option<Reading> {
         let value = *self.depth.get(cell)?;
         let steps = value & !MOVING;
         (steps > 0).then(|| Reading { depth_m: f32::from(steps) * UNIT_M, moves: value & MOVING != 0 })
@@ -179,7 +180,7 @@ impl KeyframePatch {
 
     /// Class of a cell's surface, 0 where it is unknown; `None` where nobody looked.
     #[inline]
-    pub fn class(&self, cell: usize) -> Option<u8> {
+    pub(crate) fn class(&self, cell: usize) -> Option<u8> {
         self.class.get(cell).copied()
     }
 

@@ -26,7 +26,7 @@ use crate::worker::{Execution, Worker};
 const WAITING: usize = 2;
 
 /// Keeps the patches of keyframes at the poses that the map gives them.
-pub struct DenseMapper {
+pub(crate) struct DenseMapper {
     config: DenseConfig,
     grid: CellGrid,
     poses: Vec<KeyframeRelativePose>,
@@ -42,7 +42,7 @@ pub struct DenseMapper {
 }
 
 /// What a patch is extracted from.
-pub struct Source<'a> {
+pub(crate) struct Source<'a> {
     /// The colour image.
     pub color: &'a RgbImage,
     /// The depth image.
@@ -91,7 +91,7 @@ impl DenseMapper {
     ///
     /// # Errors
     /// For a value of the configuration out of range, or if a thread cannot be started.
-    pub fn new(config: &DenseConfig, camera: &Camera, execution: Execution) -> Result<Self, DenseError> {
+    pub(crate) fn new(config: &DenseConfig, camera: &Camera, execution: Execution) -> Result<Self, DenseError> {
         config.validate()?;
         let grid = CellGrid::new(camera, config.stride_px);
         let mut fusion =
@@ -119,7 +119,7 @@ impl DenseMapper {
     ///
     /// # Errors
     /// If the patches have other cells or belong to another map.
-    pub fn with_earlier(mut self, earlier: DenseMap, map: &Map) -> Result<Self, DenseError> {
+    pub(crate) fn with_earlier(mut self, earlier: DenseMap, map: &Map) -> Result<Self, DenseError> {
         let DenseMap { grid, mut patches, apart, class_names } = earlier;
         if grid != self.grid {
             let (found, wanted) = (grid.stride_px(), self.grid.stride_px());
@@ -145,7 +145,7 @@ impl DenseMapper {
     }
 
     /// Returns whether a keyframe shows enough beyond the last patch to become one.
-    pub fn is_due(&self, timestamp_ns: i64, t_world_cam: &Pose) -> bool {
+    pub(crate) fn is_due(&self, timestamp_ns: i64, t_world_cam: &Pose) -> bool {
         let Some((last_ns, last)) = &self.last else { return true };
         let moved = last.inverse() * t_world_cam;
         let config = &self.config;
@@ -155,7 +155,7 @@ impl DenseMapper {
     }
 
     /// Extracts the patch of a frame, with the classes of static objects where they are known.
-    pub fn extract(&self, dynamic: &DynamicConfig, source: &Source<'_>) -> KeyframePatch {
+    pub(crate) fn extract(&self, dynamic: &DynamicConfig, source: &Source<'_>) -> KeyframePatch {
         let Source { color, depth, moving, objects } = source;
         let moves = |at, edge| moving.covers(depth, at, edge);
         let patch = KeyframePatch::extract(&self.config, &self.grid, color, depth, moves);
@@ -167,7 +167,7 @@ impl DenseMapper {
 
     /// Assigns numbers in the patches to the classes of a detector, by name: the same as in patches of an earlier session. Of more than
     /// 255 in all, the last are unknown (0).
-    pub fn name_classes(&mut self, names: &[String]) {
+    pub(crate) fn name_classes(&mut self, names: &[String]) {
         if !self.config.classes {
             return;
         }
@@ -183,7 +183,7 @@ impl DenseMapper {
     }
 
     /// Inserts a patch with its pose relative to a keyframe, and moves all patches to where the map has them now.
-    pub fn insert(&mut self, timestamp_ns: i64, pose: KeyframeRelativePose, patch: KeyframePatch, map: &Map) {
+    pub(crate) fn insert(&mut self, timestamp_ns: i64, pose: KeyframeRelativePose, patch: KeyframePatch, map: &Map) {
         self.poses.push(pose);
         let poses = self.world_poses(map);
         let pose = poses.last().copied().flatten();
@@ -200,17 +200,17 @@ impl DenseMapper {
     }
 
     /// Patches that came while the thread was busy, and were left out.
-    pub fn patches_skipped(&self) -> usize {
+    pub(crate) fn patches_skipped(&self) -> usize {
         self.patches_skipped
     }
 
     /// Number of patches.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.poses.len()
     }
 
     /// Memory of the patches, bytes.
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.bytes
     }
 
@@ -232,13 +232,13 @@ impl DenseMapper {
     }
 
     /// Returns the volume with the patches where the map has them now; waits for the thread, if there is one.
-    pub fn volume(&mut self, map: &Map) -> Volume {
+    pub(crate) fn volume(&mut self, map: &Map) -> Volume {
         let poses = self.world_poses(map);
         self.fusion.volume(poses).unwrap_or_else(|| Volume::new(&self.config))
     }
 
     /// Removes all patches: the map was begun anew.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.poses.clear();
         self.last = None;
         self.bytes = 0;
@@ -246,7 +246,7 @@ impl DenseMapper {
     }
 
     /// Returns the patches with their poses, for products and files; waits for the thread, if there is one.
-    pub fn snapshot(&mut self, map: &Map) -> DenseMap {
+    pub(crate) fn snapshot(&mut self, map: &Map) -> DenseMap {
         let poses = self.rooted_poses(map);
         let largest = largest(&poses);
         let (grid, class_names) = (self.grid.clone(), self.class_names.clone());

@@ -33,7 +33,7 @@ fn a_corridor_of_100_m_fits_into_300_mb() {
         (Isometry3::new(way, Vector3::y() * f64::from(angle(k))), KeyframePatch::of_depths(depths_m, [128; 3]))
     };
     let dense_map = DenseMap::of_poses(grid.clone(), (0..(100.0 / STEP_M) as usize).map(patch));
-    let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+    let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {}).unwrap();
     let megabytes = |bytes: usize| bytes as f64 / 1e6;
     let (patches, voxels) = (megabytes(dense_map.bytes()), megabytes(volume.bytes()));
     println!("{} keyframes: patches {patches:.0} MB, volume {voxels:.0} MB", dense_map.patches.len());

@@ -6,7 +6,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Isometry3, Point3, Vector3};
+#[cfg(test)]
+use nalgebra::Point3;
+use nalgebra::{Isometry3, Vector3};
 
 use crate::dense::cloud::neighbours;
 use crate::dense::voxels::{Block, VOXELS, Voxel, block_of, center_m, place_of, voxel_in};
@@ -34,19 +36,19 @@ struct Sample {
 
 type Field = BTreeMap<Block, Vec<Sample>>;
 
-/// The mesh of a dense_map. `told` hears how many blocks, of how many, are done.
-pub fn mesh(dense_map: &DenseMap, volume: &Volume, mut told: impl FnMut(usize, usize)) -> Mesh {
+/// The mesh of a dense_map. `progress` hears how many blocks, of how many, are done.
+pub fn mesh(dense_map: &DenseMap, volume: &Volume, mut progress: impl FnMut(usize, usize)) -> Mesh {
     let near = near_surfaces(volume);
     let mut field = Field::new();
     for (done, &block) in near.iter().enumerate() {
-        told(done, near.len());
+        progress(done, near.len());
         field.insert(block, sample(dense_map, volume, block));
     }
     surface(volume, &field)
 }
 
 /// Bytes of memory that the field of a mesh takes.
-pub fn bytes(volume: &Volume) -> usize {
+pub(crate) fn bytes(volume: &Volume) -> usize {
     near_surfaces(volume).len() * VOXELS * size_of::<Sample>()
 }
 
@@ -187,7 +189,8 @@ impl Sample {
 
 impl Mesh {
     /// Corners of a triangle, m.
-    pub fn corners(&self, triangle: [u32; 3]) -> [Point3<f32>; 3] {
+    #[cfg(test)]
+    pub(crate) fn corners(&self, triangle: [u32; 3]) -> [Point3<f32>; 3] {
         triangle.map(|vertex| self.vertices_m.get(vertex as usize).copied().unwrap_or_default().into())
     }
 }
@@ -208,7 +211,7 @@ mod tests {
         // Seen from three places.
         let patch = |k: i64| (pose(k), scene::wall(&grid, 2.0 - 0.013 * k as f32, None));
         let dense_map = DenseMap::of_poses(grid.clone(), (0..3).map(patch));
-        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {}).unwrap();
         let mesh = mesh(&dense_map, &volume, |_, _| {});
         assert!(mesh.vertices_m.iter().all(|p| (p[2] - 2.0).abs() < 0.004), "on the wall");
         assert!(mesh.colors.iter().all(|color| *color == [120, 130, 140]));

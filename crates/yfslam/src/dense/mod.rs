@@ -9,16 +9,16 @@
 //! Nothing that moves makes a surface: the dynamic filter's decision is cut into the patch. What it missed is taken back by the views
 //! that come after and see through it.
 
-pub mod background;
-pub mod classes;
-pub mod cloud;
-pub mod gravity;
-pub mod grid;
-pub mod keyframe_patch;
+mod background;
+mod classes;
+mod cloud;
+mod gravity;
+mod grid;
+mod keyframe_patch;
 mod mapper;
 #[cfg(test)]
 mod memory_tests;
-pub mod mesh;
+mod mesh;
 mod object_masks;
 mod persist;
 #[cfg(test)]
@@ -27,13 +27,20 @@ mod static_recovery;
 mod trace;
 mod view;
 mod volume;
-pub mod voxels;
+mod voxels;
 
 pub use crate::config::DenseConfig;
+pub use background::{Background, Backgrounds};
+pub use classes::{Classes, classes};
+pub use cloud::{CloudPoint, cloud};
+pub use gravity::Up;
+pub use grid::{GridCell, GroundGrid, ground_grid};
 pub use keyframe_patch::{CellGrid, KeyframePatch};
 pub(crate) use mapper::{DenseMapper, Source};
+pub use mesh::{Mesh, mesh};
 pub use view::DenseView;
 pub use volume::{KnownVoxel, Volume};
+pub use voxels::{Block, SIDE as BLOCK_SIDE, Voxel, block_of, center_m, voxel_at};
 
 use nalgebra::UnitQuaternion;
 
@@ -135,7 +142,8 @@ impl DenseMap {
     }
 
     /// A dense_map of patches whose places, world from camera, no map has to say; numbered in the order given.
-    pub fn of_poses(grid: CellGrid, patches: impl IntoIterator<Item = (Pose, KeyframePatch)>) -> Self {
+    #[cfg(test)]
+    pub(crate) fn of_poses(grid: CellGrid, patches: impl IntoIterator<Item = (Pose, KeyframePatch)>) -> Self {
         let number = |(number, (t_world_cam, patch))| PlacedPatch {
             timestamp_ns: number as i64,
             keyframe: number as u64,
@@ -150,32 +158,35 @@ impl DenseMap {
         }
     }
 
+    /// Returns the rotation after which the z-axis of the world points up.
+    pub fn turn(&self, up: Up) -> UnitQuaternion<f64> {
+        gravity::turn(self, up)
+    }
+
+    /// Returns the height of the floor in a world turned by `turn`, m; `None` where no floor was measured.
+    pub fn floor_m(&self, turn: &UnitQuaternion<f64>) -> Option<f64> {
+        gravity::floor_m(self, turn)
+    }
+
     /// Bytes of memory that its patches take.
     pub fn bytes(&self) -> usize {
         self.patches.iter().map(|one| one.patch.bytes()).sum()
     }
 
-    /// The volume of all patches in a world turned by `turn`. `told` hears how many patches are done.
-    pub fn volume(&self, config: &DenseConfig, turn: &UnitQuaternion<f64>, mut told: impl FnMut(usize)) -> Volume {
-        self.fill(config, turn, |number, _| {
-            told(number);
-            true
-        })
-    }
-
-    /// The same, within the memory that the configuration allows.
+    /// Returns the volume of all patches in a world turned by `turn`, within the memory that the configuration allows. `progress`
+    /// receives the number of patches that are done.
     ///
     /// # Errors
-    /// Where it would be more.
-    pub fn volume_within(
+    /// Where it would take more memory.
+    pub fn volume(
         &self,
         config: &DenseConfig,
         turn: &UnitQuaternion<f64>,
-        mut told: impl FnMut(usize),
+        mut progress: impl FnMut(usize),
     ) -> Result<Volume, DenseError> {
         let mut refused = None;
         let volume = self.fill(config, turn, |number, volume| {
-            told(number);
+            progress(number);
             let bytes = volume.bytes();
             if check_memory(config, "the map", bytes).is_err() {
                 // As much again for each patch that is still to come.
@@ -210,7 +221,7 @@ impl DenseMap {
 ///
 /// # Errors
 /// If the configuration allows less.
-pub fn check_memory(config: &DenseConfig, what: &'static str, bytes: usize) -> Result<(), DenseError> {
+pub(crate) fn check_memory(config: &DenseConfig, what: &'static str, bytes: usize) -> Result<(), DenseError> {
     let (needed_mb, allowed_mb) = (bytes.div_ceil(1_000_000), config.max_memory_mb);
     if needed_mb <= allowed_mb {
         return Ok(());
@@ -219,6 +230,20 @@ pub fn check_memory(config: &DenseConfig, what: &'static str, bytes: usize) -> R
     let finer = (needed_mb as f32 / allowed_mb as f32).sqrt();
     let fits_m = ((config.resolution_m * finer * 200.0).ceil() / 200.0).min(0.2);
     Err(DenseError::Memory { resolution_m: config.resolution_m, what, needed_mb, allowed_mb, fits_m })
+}
+
+/// Checks whether the cloud and the mesh of a volume may be made.
+///
+/// # Errors
+/// If one of those wanted would take more memory than the configuration of the volume allows.
+pub fn check_products(volume: &Volume, wants_cloud: bool, wants_mesh: bool) -> Result<(), DenseError> {
+    if wants_cloud {
+        check_memory(volume.config(), "the cloud", cloud::bytes(volume))?;
+    }
+    if wants_mesh {
+        check_memory(volume.config(), "the mesh", mesh::bytes(volume))?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -233,12 +258,12 @@ mod tests {
         let dense_map =
             DenseMap::of_poses(grid.clone(), (0..6).map(|k| (pose(k), scene::wall(&grid, 3.01, Some(1.5)))));
         let turn = UnitQuaternion::identity();
-        let error = dense_map.volume_within(&config, &turn, |_| {}).err().unwrap();
+        let error = dense_map.volume(&config, &turn, |_| {}).err().unwrap();
         let DenseError::Memory { fits_m, allowed_mb: 2, .. } = error else { panic!("{error}") };
         assert!(error.to_string().contains("at 0.01 m the map would take"), "{error}");
         config.resolution_m = fits_m;
-        let volume = dense_map.volume_within(&config, &turn, |_| {}).unwrap();
+        let volume = dense_map.volume(&config, &turn, |_| {}).unwrap();
         assert!(volume.bytes() <= 2_000_000);
-        assert!(volume.voxels().eq(dense_map.volume(&config, &turn, |_| {}).voxels()));
+        assert!(volume.voxels().count() > 1000);
     }
 }

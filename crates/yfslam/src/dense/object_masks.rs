@@ -13,14 +13,19 @@ use crate::image::DepthImage;
 
 /// Segmenter of static_objects, and the class of each.
 #[derive(Clone, Debug, Default)]
-pub struct ObjectMasks {
+pub(super) struct ObjectMasks {
     bodies: InstanceMask,
     classes: Vec<usize>,
 }
 
 impl ObjectMasks {
     /// Segmenter the static_objects in boxes of at least `config.open_score`.
-    pub fn segment(config: &DynamicConfig, boxes: &[Detection], depth: &DepthImage, moving: &MovingMask) -> Self {
+    pub(super) fn segment(
+        config: &DynamicConfig,
+        boxes: &[Detection],
+        depth: &DepthImage,
+        moving: &MovingMask,
+    ) -> Self {
         let mut certain: Vec<Detection> = boxes.iter().filter(|one| one.score >= config.open_score).copied().collect();
         // What stands on a table is in the table's box too, and comes before it.
         certain.sort_by(|a, b| a.bbox.area().total_cmp(&b.bbox.area()));
@@ -37,7 +42,7 @@ impl ObjectMasks {
     }
 
     /// The class, as [`Detection::class`], of the thing at a position of the raw image, px.
-    pub fn class_at(&self, raw: [f32; 2]) -> Option<usize> {
+    pub(super) fn class_at(&self, raw: [f32; 2]) -> Option<usize> {
         self.classes.get(self.bodies.body_at(raw)?).copied()
     }
 }

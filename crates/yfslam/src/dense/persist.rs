@@ -51,7 +51,7 @@ pub(super) fn encode(dense_map: &DenseMap) -> Result<Vec<u8>, ContainerError> {
 ///
 /// # Errors
 /// If the bytes are no dense_map, of another version, cut, altered, or contradict themselves; if they are a map without one.
-pub fn decode(bytes: &[u8]) -> Result<DenseMap, ContainerError> {
+pub(super) fn decode(bytes: &[u8]) -> Result<DenseMap, ContainerError> {
     if MAP.begins(bytes) {
         return Err(ContainerError::NoPieces);
     }

@@ -161,7 +161,7 @@ mod tests {
             }
         }
         let dense_map = DenseMap::of_poses(grid.clone(), [(Pose::identity(), known)]);
-        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {});
+        let volume = dense_map.volume(&config, &UnitQuaternion::identity(), |_| {}).unwrap();
         let found = beside(&volume, &volume.pose(0).unwrap().cast(), &grid, &seen);
         (grid, found)
     }

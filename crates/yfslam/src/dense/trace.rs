@@ -12,7 +12,7 @@ use crate::dense::voxels::{Bits, Block, Voxel, block_of, place_of, voxel_at};
 
 /// What a patch says of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Seen {
+pub(super) struct Seen {
     /// The block.
     pub block: Block,
     /// Voxels in which readings end.
@@ -93,7 +93,12 @@ impl Window {
 }
 
 /// What a patch that hangs at `t_map_cam` says, ordered by block.
-pub fn trace(config: &DenseConfig, grid: &CellGrid, patch: &KeyframePatch, t_map_cam: &Isometry3<f64>) -> Vec<Seen> {
+pub(super) fn trace(
+    config: &DenseConfig,
+    grid: &CellGrid,
+    patch: &KeyframePatch,
+    t_map_cam: &Isometry3<f64>,
+) -> Vec<Seen> {
     let per_m = 1.0 / config.resolution_m;
     let pose: Isometry3<f32> = t_map_cam.cast();
     let rotation = pose.rotation.to_rotation_matrix();

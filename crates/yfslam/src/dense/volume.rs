@@ -66,7 +66,7 @@ pub struct KnownVoxel {
 
 impl Volume {
     /// An empty volume.
-    pub fn new(config: &DenseConfig) -> Self {
+    pub(crate) fn new(config: &DenseConfig) -> Self {
         let log_odds = |p: f32| ((p / (1.0 - p)).ln() * PER_UNIT).round() as i16;
         let steps = Steps {
             hit: log_odds(config.hit),
@@ -85,7 +85,7 @@ impl Volume {
 
     /// Enters patch number `number`, or moves it if it hangs elsewhere by now: if its surfaces may be off by more than
     /// `follow_voxels`. `None` takes it out. Returns whether anything changed.
-    pub fn place(
+    pub(crate) fn place(
         &mut self,
         number: usize,
         grid: &CellGrid,
@@ -148,7 +148,7 @@ impl Volume {
     }
 
     /// Adds up what is new. Questions are answered as of the last time.
-    pub fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         for state in self.blocks.values_mut() {
             state.add_up(&self.steps);
         }
@@ -192,12 +192,12 @@ impl Volume {
     }
 
     /// Numbers of the patches that have something to say of a block, ascending.
-    pub fn seen_by(&self, block: Block) -> impl Iterator<Item = usize> {
+    pub(crate) fn seen_by(&self, block: Block) -> impl Iterator<Item = usize> {
         self.blocks.get(&block).into_iter().flat_map(|state| state.said.iter().map(|(number, ..)| *number as usize))
     }
 
     /// Where a patch hangs in the volume.
-    pub fn pose(&self, number: usize) -> Option<&Isometry3<f64>> {
+    pub(crate) fn pose(&self, number: usize) -> Option<&Isometry3<f64>> {
         Some(&self.patches.get(number)?.as_ref()?.t_map_cam)
     }
 

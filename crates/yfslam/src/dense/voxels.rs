@@ -8,7 +8,7 @@ use nalgebra::Point3;
 /// Voxels along a side of a block.
 pub const SIDE: i32 = 8;
 /// Voxels in a block.
-pub const VOXELS: usize = (SIDE * SIDE * SIDE) as usize;
+pub(crate) const VOXELS: usize = (SIDE * SIDE * SIDE) as usize;
 
 /// A voxel: its lower corner, in voxels.
 pub type Voxel = [i32; 3];
@@ -30,14 +30,14 @@ pub fn block_of(voxel: Voxel) -> Block {
 
 /// Place of a voxel in its block: x fastest, then y, then z.
 #[inline]
-pub fn place_of(voxel: Voxel) -> usize {
+pub(crate) fn place_of(voxel: Voxel) -> usize {
     let [x, y, z] = voxel.map(|v| v.rem_euclid(SIDE) as usize);
     x + SIDE as usize * (y + SIDE as usize * z)
 }
 
 /// The voxel at a place in a block.
 #[inline]
-pub fn voxel_in(block: Block, place: usize) -> Voxel {
+pub(crate) fn voxel_in(block: Block, place: usize) -> Voxel {
     let side = SIDE as usize;
     let offset = [place % side, place / side % side, place / (side * side)];
     [0, 1, 2].map(|axis| block[axis] * SIDE + offset[axis] as i32)
@@ -50,41 +50,41 @@ pub fn center_m(voxel: Voxel, resolution_m: f32) -> Point3<f32> {
 
 /// A set of voxels of a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Bits([u64; SIDE as usize]);
+pub(crate) struct Bits([u64; SIDE as usize]);
 
 impl Bits {
     /// Adds a place.
     #[inline]
-    pub fn insert(&mut self, place: usize) {
+    pub(crate) fn insert(&mut self, place: usize) {
         self.0[place / 64] |= 1 << (place % 64);
     }
 
     /// Whether a place is in the set.
     #[inline]
-    pub fn contains(&self, place: usize) -> bool {
+    pub(crate) fn contains(&self, place: usize) -> bool {
         self.0[place / 64] >> (place % 64) & 1 == 1
     }
 
     /// Takes the places of another set out.
     #[inline]
-    pub fn remove_all(&mut self, other: &Self) {
+    pub(crate) fn remove_all(&mut self, other: &Self) {
         self.0.iter_mut().zip(other.0).for_each(|(word, other)| *word &= !other);
     }
 
     /// Adds the places of another set.
     #[inline]
-    pub fn insert_all(&mut self, other: &Self) {
+    pub(crate) fn insert_all(&mut self, other: &Self) {
         self.0.iter_mut().zip(other.0).for_each(|(word, other)| *word |= other);
     }
 
     /// Whether the set is empty.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.0 == [0; SIDE as usize]
     }
 
     /// Calls `f` for each place, ascending.
     #[inline]
-    pub fn for_each(&self, mut f: impl FnMut(usize)) {
+    pub(crate) fn for_each(&self, mut f: impl FnMut(usize)) {
         for (i, &word) in self.0.iter().enumerate() {
             let mut rest = word;
             while rest != 0 {

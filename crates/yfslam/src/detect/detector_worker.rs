@@ -14,7 +14,7 @@ type Answer = (Result<(), DetectorError>, DetectorOutput);
 
 /// What a detector found in one image.
 #[derive(Debug, Default)]
-pub struct DetectorOutput {
+pub(crate) struct DetectorOutput {
     /// The detections, best score first.
     pub detections: Vec<Detection>,
     /// The mask of a detector that segments.
@@ -22,7 +22,7 @@ pub struct DetectorOutput {
 }
 
 /// Runs a detector on a thread.
-pub struct DetectorWorker {
+pub(crate) struct DetectorWorker {
     worker: Worker<Request, Answer>,
     output: DetectorOutput,
     busy: bool,
@@ -33,7 +33,7 @@ impl DetectorWorker {
     ///
     /// # Errors
     /// If the operating system grants no thread.
-    pub fn spawn(mut detector: Box<dyn Detector>) -> std::io::Result<Self> {
+    pub(crate) fn spawn(mut detector: Box<dyn Detector>) -> std::io::Result<Self> {
         let mut compensation = RollCompensation::default();
         let detect = move |(image, roll_deg, mut detections): Request| {
             let result = compensation.detect(&mut *detector, &image, roll_deg, &mut detections);
@@ -44,7 +44,7 @@ impl DetectorWorker {
     }
 
     /// Hands over an image, unless one is under way.
-    pub fn start(&mut self, image: &Arc<RgbImage>, roll_deg: i32) {
+    pub(crate) fn start(&mut self, image: &Arc<RgbImage>, roll_deg: i32) {
         if !self.busy && self.worker.is_alive() {
             // A thread that has ended is noticed when its answer is awaited.
             self.worker.send((Arc::clone(image), roll_deg, std::mem::take(&mut self.output.detections)));
@@ -53,7 +53,7 @@ impl DetectorWorker {
     }
 
     /// Waits for the detections of the image under way; `None` if there is none.
-    pub fn finish(&mut self) -> Option<Result<&DetectorOutput, DetectorError>> {
+    pub(crate) fn finish(&mut self) -> Option<Result<&DetectorOutput, DetectorError>> {
         if !self.busy {
             return None;
         }
@@ -62,7 +62,7 @@ impl DetectorWorker {
     }
 
     /// Returns the detections of the image under way if they are ready.
-    pub fn poll(&mut self) -> Option<Result<&DetectorOutput, DetectorError>> {
+    pub(crate) fn poll(&mut self) -> Option<Result<&DetectorOutput, DetectorError>> {
         if !self.busy {
             return None;
         }

@@ -29,14 +29,14 @@ pub(crate) struct GravityDirection {
 
 impl GravityDirection {
     /// Takes note of a picture taken at `t_cam_world`.
-    pub fn add(&mut self, t_cam_world: &Pose) {
+    pub(crate) fn add(&mut self, t_cam_world: &Pose) {
         self.sum += t_cam_world.rotation.inverse() * Vector3::y();
         self.frames += 1;
     }
 
     /// How far a camera at `t_cam_world` is rolled clockwise, in steps of 5°; 0 up to `limit_deg`, as long as few pictures were seen, and
     /// where the camera looks so far up or down that it cannot be said.
-    pub fn roll_deg(&self, t_cam_world: &Pose, limit_deg: f64) -> i32 {
+    pub(crate) fn roll_deg(&self, t_cam_world: &Pose, limit_deg: f64) -> i32 {
         let down = t_cam_world.rotation * self.sum / self.frames.max(1) as f64;
         if self.frames < LEAST_FRAMES || down.xy().norm() < LEAST_DOWN {
             return 0;

@@ -8,7 +8,7 @@ use crate::image::DepthImage;
 
 /// Takes the boxes that are certain enough as they are.
 #[derive(Clone, Debug, Default)]
-pub struct Boxes {
+pub(super) struct Boxes {
     regions: Vec<Region>,
     /// Boxes whose features are needed, though they move.
     given_up: Vec<Region>,

@@ -7,7 +7,7 @@ use rand_pcg::rand_core::Rng;
 
 /// A run of like depths.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DepthGroup {
+pub(crate) struct DepthGroup {
     /// Nearest member, m.
     pub near_m: f32,
     /// Farthest member, m.
@@ -22,7 +22,7 @@ const RANSAC_CONFIDENCE: f64 = 0.99;
 const RANSAC_MAX_DRAWS: f64 = 200.0;
 
 /// The interval of width `width_m` that holds most of `sorted` (ascending); the nearest of equals. `None` for no depths.
-pub fn largest_exact(sorted: &[f32], width_m: f32) -> Option<DepthGroup> {
+pub(crate) fn largest_exact(sorted: &[f32], width_m: f32) -> Option<DepthGroup> {
     let mut best: Option<DepthGroup> = None;
     let mut end = 0;
     for (start, &near) in sorted.iter().enumerate() {
@@ -40,7 +40,7 @@ pub fn largest_exact(sorted: &[f32], width_m: f32) -> Option<DepthGroup> {
 ///
 /// YOLO-SLAM tests the variance of the pair and a third depth; for a pair at distance 2e and a depth δ from its mean that is
 /// (2e² + 2δ²/3)/3, so a bound on it is a bound on δ. It is stated as the width here, in metres.
-pub fn largest_ransac(sorted: &[f32], width_m: f32, rng: &mut Pcg32) -> Option<DepthGroup> {
+pub(crate) fn largest_ransac(sorted: &[f32], width_m: f32, rng: &mut Pcg32) -> Option<DepthGroup> {
     let n = sorted.len();
     if n < 3 {
         return largest_exact(sorted, width_m);

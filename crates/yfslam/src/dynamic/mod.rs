@@ -5,7 +5,7 @@
 
 mod baselines;
 mod boxes;
-pub mod depth_group;
+pub(crate) mod depth_group;
 mod full;
 mod none;
 mod region;
@@ -51,7 +51,7 @@ pub struct FirstPose<'a> {
 }
 
 /// Returns the filter of a method; its random draws start from `seed`.
-pub fn filter_for(method: Method, seed: u64) -> Box<dyn DynamicFilter> {
+pub(crate) fn filter_for(method: Method, seed: u64) -> Box<dyn DynamicFilter> {
     match method {
         Method::None => Box::new(none::NoFilter),
         Method::Boxes => Box::<boxes::Boxes>::default(),

@@ -6,7 +6,7 @@ use crate::features::FrameFeatures;
 
 /// Leaves the features as they come: trusted.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct NoFilter;
+pub(super) struct NoFilter;
 
 impl DynamicFilter for NoFilter {
     fn before_pose(&mut self, _config: &DynamicConfig, _evidence: &FilterInput<'_>, _features: &mut FrameFeatures) {}

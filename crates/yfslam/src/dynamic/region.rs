@@ -43,7 +43,7 @@ impl MovingMask {
 
 /// Distrusts the features of all regions. If that leaves too few, the regions of least confidence are given up one by one: a false box
 /// must not take the ground from under tracking. Those go to `given_up`.
-pub fn apply(
+pub(super) fn apply(
     config: &DynamicConfig,
     regions: &mut Vec<Region>,
     given_up: &mut Vec<Region>,

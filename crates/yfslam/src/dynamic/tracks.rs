@@ -10,7 +10,7 @@ use crate::dynamic::segment::mask::Extent;
 
 /// A movable object followed in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Track {
+pub(crate) struct Track {
     /// Where it is, or should be, px.
     pub bbox: BoundingBox,
     /// Score of its last detection.
@@ -37,7 +37,7 @@ pub struct Track {
 
 /// All tracks, in the order in which they were opened.
 #[derive(Clone, Debug, Default)]
-pub struct Tracks {
+pub(crate) struct Tracks {
     /// The tracks.
     pub list: Vec<Track>,
     /// Overlap, track and detection of each pair that may belong together.
@@ -49,7 +49,7 @@ pub struct Tracks {
 impl Tracks {
     /// Takes the boxes of the next frame in, with the depth of the body in each, m, where it is known; `size` is the image's width and
     /// height, px. A box whose body is nearer or farther than a track's belongs to somebody else, who walks past: the track is carried on.
-    pub fn update(
+    pub(crate) fn update(
         &mut self,
         config: &DynamicConfig,
         max_misses: usize,
@@ -108,7 +108,7 @@ impl Tracks {
     /// Gives the box of a new track, whose body would be `center_m` away, to one that was carried and whose body stands before that, if there
     /// is one with much the same box; the new one then ends. It was opened because somebody else covers most of the box, and what is left
     /// of it is the wall.
-    pub fn give_box_back(&mut self, config: &DynamicConfig, from: usize, center_m: f32) -> bool {
+    pub(crate) fn give_box_back(&mut self, config: &DynamicConfig, from: usize, center_m: f32) -> bool {
         let Track { bbox, score, depth_m, .. } = self.list[from];
         let is_his = |track: &Track| {
             let seen = track.misses > 0 && track.depth_age == 0 && !track.ended;
@@ -124,7 +124,7 @@ impl Tracks {
     }
 
     /// Takes a frame in for which nobody looked for boxes: tracks are carried on, however long that lasts.
-    pub fn carry(&mut self, [width, height]: [usize; 2]) {
+    pub(crate) fn carry(&mut self, [width, height]: [usize; 2]) {
         let image = BoundingBox { x_min: 0.0, y_min: 0.0, x_max: width as f32, y_max: height as f32 };
         for track in &mut self.list {
             track.misses += 1;
@@ -137,25 +137,25 @@ impl Tracks {
 
 impl Track {
     /// Whether it is to be outlined.
-    pub fn is_body(&self) -> bool {
+    pub(crate) fn is_body(&self) -> bool {
         !self.ended && !self.refuted
     }
 
     /// Its box, with the depths of the body.
-    pub fn region(&self, config: &DynamicConfig) -> Region {
+    pub(crate) fn region(&self, config: &DynamicConfig) -> Region {
         let depth_m = self.depth_m.map(|z| [z - config.group_half_width_m, z + config.group_half_width_m]);
         Region { bbox: self.bbox, score: self.score, misses: self.misses, depth_m }
     }
 
     /// Whether a body that fills its box at this depth, m, can be its own: without a sure box to say so, bodies do not jump.
-    pub fn can_be_at(&self, config: &DynamicConfig, center_m: f32) -> bool {
+    pub(crate) fn can_be_at(&self, config: &DynamicConfig, center_m: f32) -> bool {
         let is_sure = self.misses == 0 && self.score >= config.open_score;
         is_sure || self.depth_m.is_none_or(|z| (center_m - z).abs() <= config.full.max_jump_m)
     }
 
     /// Hides it behind what appeared in its box at this depth, m. Returns a track of that, if it is nearer and came just now: whoever hides
     /// a body that is followed moves too, though no detector may have seen him yet.
-    pub fn hide(&mut self, center_m: Option<f32>) -> Option<Track> {
+    pub(crate) fn hide(&mut self, center_m: Option<f32>) -> Option<Track> {
         let nearer = center_m.filter(|z| !self.hidden && self.depth_m.is_some_and(|own| *z < own))?;
         let in_front = Track { depth_m: Some(nearer), ended: false, ..*self };
         self.hidden = true;
@@ -163,7 +163,7 @@ impl Track {
     }
 
     /// Learns which part of the box the body fills. Without a detection the box follows the body, as long as that is seen whole.
-    pub fn note_body(&mut self, config: &DynamicConfig, body: &Extent) {
+    pub(crate) fn note_body(&mut self, config: &DynamicConfig, body: &Extent) {
         self.hidden = false;
         self.depth_age = 0;
         let [x, y] = center(&self.bbox);

@@ -14,7 +14,7 @@ use crate::image::DepthImage;
 
 /// Follows boxes over time and cuts bodies out of them by depth.
 #[derive(Clone, Debug)]
-pub struct YfSlam {
+pub(super) struct YfSlam {
     tracks: Tracks,
     groups: DepthClusters,
     regions: Vec<Region>,
@@ -24,7 +24,7 @@ pub struct YfSlam {
 
 impl YfSlam {
     /// Draws start from `seed`.
-    pub fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         Self { tracks: Tracks::default(), groups: DepthClusters::new(seed), regions: Vec::new(), given_up: Vec::new() }
     }
 

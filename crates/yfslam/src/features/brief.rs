@@ -77,12 +77,12 @@ pub(crate) struct Describer {
 }
 
 impl Describer {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self { patterns: (0..BINS).map(|bin| rotated(bin as f32 * TAU / BINS as f32)).collect() }
     }
 
     /// Appends the descriptor of each corner; bit `i` says that the first point of pair `i` is darker than the second.
-    pub fn describe(
+    pub(super) fn describe(
         &self,
         level: Level,
         blurred: &Plane,

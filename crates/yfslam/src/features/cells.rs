@@ -13,7 +13,7 @@ pub(crate) struct Cells {
 
 impl Cells {
     /// Appends to `corners.strong` each weak corner whose cell, `side` (≥ 1) px wide, has no strong one.
-    pub fn fill_empty(&mut self, side: usize, [width, height]: [usize; 2], corners: &mut Corners) {
+    pub(super) fn fill_empty(&mut self, side: usize, [width, height]: [usize; 2], corners: &mut Corners) {
         let per_row = width / side + 1;
         self.has_strong.clear();
         self.has_strong.resize(per_row * (height / side + 1), false);

@@ -37,7 +37,7 @@ pub(crate) struct Distributor {
 
 impl Distributor {
     /// Reduces `corners` to at most `quota`, evenly spread.
-    pub fn select(&mut self, corners: &mut Vec<Corner>, quota: usize) {
+    pub(super) fn select(&mut self, corners: &mut Vec<Corner>, quota: usize) {
         if corners.len() <= quota {
             return;
         }

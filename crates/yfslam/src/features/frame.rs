@@ -45,7 +45,7 @@ pub struct FrameFeatures {
 
 /// Extent of the undistorted image, px.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ImageBounds {
+pub(crate) struct ImageBounds {
     /// Left.
     pub u_min: f32,
     /// Right.
@@ -58,7 +58,7 @@ pub struct ImageBounds {
 
 impl ImageBounds {
     /// The undistorted extent of the camera's image: the box around its undistorted border.
-    pub fn of(camera: &Camera) -> Self {
+    pub(crate) fn of(camera: &Camera) -> Self {
         let (w, h) = (camera.width as f64, camera.height as f64);
         let border = (0..=16).flat_map(|i| {
             let t = f64::from(i) / 16.0;
@@ -76,14 +76,14 @@ impl ImageBounds {
     }
 
     /// Whether an undistorted position lies inside.
-    pub fn contains(&self, u: f32, v: f32) -> bool {
+    pub(crate) fn contains(&self, u: f32, v: f32) -> bool {
         u >= self.u_min && u < self.u_max && v >= self.v_min && v < self.v_max
     }
 }
 
 impl FrameFeatures {
     /// Refills `self` from one frame's key points; all features start trusted. Buffers are reused.
-    pub fn fill(&mut self, extracted: &Features, depth: &DepthImage, camera: &Camera, bounds: ImageBounds) {
+    pub(crate) fn fill(&mut self, extracted: &Features, depth: &DepthImage, camera: &Camera, bounds: ImageBounds) {
         self.bounds = bounds;
         self.descriptors.clone_from(&extracted.descriptors);
         self.features.clear();
@@ -103,7 +103,7 @@ impl FrameFeatures {
     }
 
     /// Features that were taken apart, put together again; `descriptors[i]` is that of `features[i]`.
-    pub fn from_parts(features: Vec<Feature>, descriptors: Vec<Descriptor>, bounds: ImageBounds) -> Self {
+    pub(crate) fn from_parts(features: Vec<Feature>, descriptors: Vec<Descriptor>, bounds: ImageBounds) -> Self {
         let mut whole = Self { features, descriptors, bounds, ..Default::default() };
         whole.index();
         whole
@@ -119,15 +119,10 @@ impl FrameFeatures {
         self.features.is_empty()
     }
 
-    /// Extent of the undistorted image.
-    pub fn bounds(&self) -> ImageBounds {
-        self.bounds
-    }
-
     /// Calls `visit` with the index of each feature within `radius` (px, maximum norm) of (u, v) whose octave lies in
     /// `octaves`.
     #[inline(always)]
-    pub fn for_each_near(
+    pub(crate) fn for_each_near(
         &self,
         u: f32,
         v: f32,

@@ -7,7 +7,7 @@ use super::Descriptor;
 
 /// One of the descriptors compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Neighbor {
+pub(crate) struct Neighbor {
     /// Its index among all descriptors.
     pub index: u32,
     /// Number of differing bits, 0–256.
@@ -17,7 +17,7 @@ pub struct Neighbor {
 /// The nearest and the second nearest to `query` among `descriptors[i]` for all `i` in `candidates`.
 ///
 /// Of equally near ones the earlier candidate comes first; indices out of range are passed over.
-pub fn two_nearest(query: &Descriptor, descriptors: &[Descriptor], candidates: &[u32]) -> [Option<Neighbor>; 2] {
+pub(crate) fn two_nearest(query: &Descriptor, descriptors: &[Descriptor], candidates: &[u32]) -> [Option<Neighbor>; 2] {
     // The baseline of x86-64 has no instruction that counts bits.
     dispatch!(Level::new(), simd => search(simd, query, descriptors, candidates))
 }
@@ -43,18 +43,18 @@ const BINS: usize = 30;
 
 /// A histogram of the turn of each match; those outside its three highest bins are outliers.
 #[derive(Clone, Debug, Default)]
-pub struct RotationHistogram {
+pub(crate) struct RotationHistogram {
     entries: Vec<(u8, u32)>,
 }
 
 impl RotationHistogram {
     /// Forgets all matches.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.entries.clear();
     }
 
     /// Notes that match `payload` turned by `turn_rad`, any angle.
-    pub fn add(&mut self, turn_rad: f32, payload: u32) {
+    pub(crate) fn add(&mut self, turn_rad: f32, payload: u32) {
         let turns = turn_rad / std::f32::consts::TAU;
         // The fraction may round up to 1.
         let bin = ((turns - turns.floor()) * BINS as f32) as usize % BINS;
@@ -63,7 +63,7 @@ impl RotationHistogram {
 
     /// Calls `visit` for each match outside the dominant bins. The second and third bin count only if they hold at least a tenth of
     /// the first.
-    pub fn for_each_outlier(&self, mut visit: impl FnMut(u32)) {
+    pub(crate) fn for_each_outlier(&self, mut visit: impl FnMut(u32)) {
         let mut counts = [0usize; BINS];
         for (bin, _) in &self.entries {
             counts[usize::from(*bin)] += 1;

@@ -7,18 +7,19 @@ mod cells;
 mod distribute;
 mod fast;
 mod frame;
-pub mod matching;
+pub(crate) mod matching;
 mod orb;
 mod orientation;
 mod pattern;
-pub mod stereo;
-pub mod stereo_worker;
+pub(crate) mod stereo;
+pub(crate) mod stereo_worker;
 
-pub use frame::{Feature, FrameFeatures, ImageBounds};
+pub(crate) use frame::ImageBounds;
+pub use frame::{Feature, FrameFeatures};
 pub use orb::{Features, OrbExtractor};
 
 /// Radius of the patch from which orientation and descriptor are read, px of the level (Rublee et al., ICCV 2011: patch 31).
-pub const PATCH_RADIUS: usize = 15;
+pub(crate) const PATCH_RADIUS: usize = 15;
 
 /// A corner found in a pyramid level, in pixels of the full image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -78,7 +78,7 @@ impl OrbExtractor {
     }
 
     /// Changes how many features the next images are asked for.
-    pub fn set_count(&mut self, count: usize) {
+    pub(crate) fn set_count(&mut self, count: usize) {
         self.config.count = count;
     }
 

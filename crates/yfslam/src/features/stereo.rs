@@ -12,7 +12,7 @@ use crate::image::{GrayImage, Plane, RgbImage, gray_from_rgb};
 
 /// One picture with its features.
 #[derive(Debug)]
-pub struct StereoView {
+pub(crate) struct StereoView {
     gray: GrayImage,
     extractor: OrbExtractor,
     features: Features,
@@ -23,7 +23,7 @@ pub struct StereoView {
 
 /// Finds the features of the left picture in the right one. Buffers are reused from frame to frame.
 #[derive(Clone, Debug)]
-pub struct StereoMatcher {
+pub(crate) struct StereoMatcher {
     config: StereoConfig,
     /// Baseline times focal length, px·m, and the largest disparity, px.
     bf: f32,
@@ -43,7 +43,7 @@ struct Match {
 
 impl StereoView {
     /// Extracts features as `config` says.
-    pub fn new(config: &FeatureConfig) -> Self {
+    pub(crate) fn new(config: &FeatureConfig) -> Self {
         Self {
             gray: GrayImage::default(),
             extractor: OrbExtractor::new(config),
@@ -54,7 +54,7 @@ impl StereoView {
     }
 
     /// Extracts about `count` features of the next image.
-    pub fn extract(&mut self, image: &RgbImage, count: usize) {
+    pub(crate) fn extract(&mut self, image: &RgbImage, count: usize) {
         gray_from_rgb(image, &mut self.gray);
         self.extractor.set_count(count);
         self.extractor.extract(&self.gray, &mut self.features);
@@ -94,7 +94,7 @@ impl StereoView {
 
 impl StereoMatcher {
     /// For a camera of which `bf` is the baseline times the focal length `fx`, px·m.
-    pub fn new(config: &StereoConfig, bf: f64, fx: f64) -> Self {
+    pub(crate) fn new(config: &StereoConfig, bf: f64, fx: f64) -> Self {
         Self {
             config: config.clone(),
             bf: bf as f32,
@@ -107,7 +107,7 @@ impl StereoMatcher {
 
     /// Calls `tell` with the index and the depth, m, of each feature of `left` that is in `right` too; `extractor` has just found those
     /// of `left`.
-    pub fn match_rows(
+    pub(crate) fn match_rows(
         &mut self,
         extractor: &OrbExtractor,
         left: &Features,

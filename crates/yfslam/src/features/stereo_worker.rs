@@ -14,13 +14,13 @@ use crate::worker::Worker;
 /// Side of the square that a feature's depth fills in the depth image of a stereo camera, px: that of the cells of instance masks.
 const SQUARE_PX: usize = 4;
 /// Unit of that depth image, m.
-pub const METRES_PER_UNIT: f32 = 1e-3;
+pub(crate) const METRES_PER_UNIT: f32 = 1e-3;
 
 /// An image, the number of features to extract, and the buffers that they go to.
 type Request = (Arc<RgbImage>, usize, Box<StereoView>);
 
 /// Extracts the features of right images and matches them with those of left images.
-pub struct StereoWorker {
+pub(crate) struct StereoWorker {
     matcher: StereoMatcher,
     /// Features of the right image as a multiple of those of the left image.
     right_features: f64,
@@ -34,7 +34,7 @@ impl StereoWorker {
     ///
     /// # Errors
     /// If the operating system grants no thread.
-    pub fn spawn(features: &FeatureConfig, config: &StereoConfig, bf: f64, fx: f64) -> std::io::Result<Self> {
+    pub(crate) fn spawn(features: &FeatureConfig, config: &StereoConfig, bf: f64, fx: f64) -> std::io::Result<Self> {
         let extract = |(image, count, mut view): Request| {
             view.extract(&image, count);
             Some(view)
@@ -48,7 +48,7 @@ impl StereoWorker {
     }
 
     /// Hands over the right image of a frame whose left image is to have `count` features.
-    pub fn start(&mut self, image: &Arc<RgbImage>, count: usize) {
+    pub(crate) fn start(&mut self, image: &Arc<RgbImage>, count: usize) {
         if let Some(view) = self.view.take() {
             // A thread that has ended is noticed when its answer is awaited.
             self.worker.send((Arc::clone(image), (self.right_features * count as f64) as usize, view));
@@ -57,7 +57,7 @@ impl StereoWorker {
 
     /// Sets the depths of `features`, which were made of `left`, which `extractor` has just extracted. `sparse_depth` becomes zero but
     /// for a square around each feature that has a depth.
-    pub fn finish(
+    pub(crate) fn finish(
         &mut self,
         extractor: &OrbExtractor,
         left: &Features,

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use crate::geometry::Pose;
 
 /// The four motions `t_second_first` of an essential matrix, with baselines of length 1; none if it is not finite.
-pub fn motions_of_essential(e: &Matrix3<f64>) -> Vec<Pose> {
+pub(crate) fn motions_of_essential(e: &Matrix3<f64>) -> Vec<Pose> {
     let svd = e.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Vec::new() };
     // The left null vector is the baseline; nalgebra sorts singular values in descending order.

@@ -7,14 +7,19 @@ use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
 
 /// A position in the first picture and in the second, px.
-pub type Pair = ([f32; 2], [f32; 2]);
+pub(crate) type Pair = ([f32; 2], [f32; 2]);
 
 /// Draws at most.
 const MAX_DRAWS: f64 = 500.0;
 
 /// F that most pairs fit within `limit_px` of their epipolar line, sought until it is found with `confidence`; `None` for fewer than
 /// eight pairs.
-pub fn fundamental_ransac(pairs: &[Pair], limit_px: f64, confidence: f64, rng: &mut Pcg32) -> Option<Matrix3<f64>> {
+pub(crate) fn fundamental_ransac(
+    pairs: &[Pair],
+    limit_px: f64,
+    confidence: f64,
+    rng: &mut Pcg32,
+) -> Option<Matrix3<f64>> {
     if pairs.len() < 8 {
         return None;
     }
@@ -41,14 +46,14 @@ pub fn fundamental_ransac(pairs: &[Pair], limit_px: f64, confidence: f64, rng: &
 }
 
 /// Distance of the second position from the epipolar line of the first, px.
-pub fn epipolar_distance(f: &Matrix3<f64>, ([x1, y1], [x2, y2]): &Pair) -> f64 {
+pub(crate) fn epipolar_distance(f: &Matrix3<f64>, ([x1, y1], [x2, y2]): &Pair) -> f64 {
     let line = f * Vector3::new(f64::from(*x1), f64::from(*y1), 1.0);
     let length = line.x.hypot(line.y);
     (line.x * f64::from(*x2) + line.y * f64::from(*y2) + line.z).abs() / length.max(1e-12)
 }
 
 /// The normalised eight-point algorithm; `None` if the pairs do not determine F.
-pub fn eight_point(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f64>> {
+pub(super) fn eight_point(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f64>> {
     let row = |a: &Vector3<f64>, b: &Vector3<f64>| {
         [SMatrix::from([b.x * a.x, b.x * a.y, b.x, b.y * a.x, b.y * a.y, b.y, a.x, a.y, 1.0])]
     };

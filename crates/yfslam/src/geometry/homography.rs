@@ -13,7 +13,7 @@ use crate::geometry::Pose;
 const MIN_SPREAD: f64 = 1e-6;
 
 /// The normalised direct linear transform; `None` if the pairs do not determine H.
-pub fn homography(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f64>> {
+pub(super) fn homography(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f64>> {
     let rows = |a: &Vector3<f64>, b: &Vector3<f64>| {
         [(b.x, 0), (b.y, 3)].map(|(scale, row_of)| {
             let mut row = SMatrix::<f64, 9, 1>::zeros();
@@ -28,14 +28,14 @@ pub fn homography(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f
 }
 
 /// Squared distance of the second position from where H takes the first, px².
-pub fn transfer_distance2(h: &Matrix3<f64>, ([x1, y1], [x2, y2]): &Pair) -> f64 {
+pub(super) fn transfer_distance2(h: &Matrix3<f64>, ([x1, y1], [x2, y2]): &Pair) -> f64 {
     let p = h * Vector3::new(f64::from(*x1), f64::from(*y1), 1.0);
     (p.x / p.z - f64::from(*x2)).powi(2) + (p.y / p.z - f64::from(*y2)).powi(2)
 }
 
 /// The motions `t_second_first` that explain a homography of rays (K⁻¹ H K), with baselines of length 1; none for a rotation alone.
 /// `x₂ᵀ H x₁` must be positive for what both see. Two of the four put the plane in front of the first camera.
-pub fn motions_of_homography(h: &Matrix3<f64>) -> Vec<Pose> {
+pub(super) fn motions_of_homography(h: &Matrix3<f64>) -> Vec<Pose> {
     let svd = h.svd(false, true);
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));

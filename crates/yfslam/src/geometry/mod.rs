@@ -10,19 +10,19 @@ mod sim3;
 mod triangulate;
 mod two_view;
 
-pub use essential::motions_of_essential;
-pub use fundamental::{Pair, epipolar_distance, fundamental_ransac};
-pub use p3p::p3p;
-pub use pinhole::Pinhole;
-pub use se3::{perturbed, se3_exp, se3_log, skew};
+pub(crate) use essential::motions_of_essential;
+pub(crate) use fundamental::{Pair, epipolar_distance, fundamental_ransac};
+pub(crate) use p3p::p3p;
+pub(crate) use pinhole::Pinhole;
+pub(crate) use se3::{perturbed, se3_exp, se3_log, skew};
 #[cfg(test)]
-pub use sim3::sim3_from_tangent;
-pub use sim3::{
+pub(crate) use sim3::sim3_from_tangent;
+pub(crate) use sim3::{
     Similarity, Tangent, TangentMap, absolute_orientation, rigid, sim3_adjoint, sim3_perturbed, sim3_tangent, unscaled,
     with_scale,
 };
-pub use triangulate::midpoint;
-pub use two_view::{TwoView, reconstruct};
+pub(crate) use triangulate::midpoint;
+pub(crate) use two_view::{TwoView, reconstruct};
 
 /// A rigid motion; `t_a_b` maps points given in frame b into frame a.
 pub type Pose = nalgebra::Isometry3<f64>;

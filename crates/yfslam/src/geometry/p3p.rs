@@ -9,7 +9,7 @@ use crate::geometry::Pose;
 
 /// All `t_cam_world` that map the points (world, m) onto rays of the given directions (camera frame, unit length), in front of the
 /// camera. Empty if the points lie on a line or nothing fits.
-pub fn p3p(points_world: &[Point3<f64>; 3], rays: &[Vector3<f64>; 3]) -> impl Iterator<Item = Pose> + use<> {
+pub(crate) fn p3p(points_world: &[Point3<f64>; 3], rays: &[Vector3<f64>; 3]) -> impl Iterator<Item = Pose> + use<> {
     let [p1, p2, p3] = points_world;
     let (a, b, c) = ((p2 - p3).norm_squared(), (p1 - p3).norm_squared(), (p1 - p2).norm_squared());
     let (cos_a, cos_b, cos_c) = (rays[1].dot(&rays[2]), rays[0].dot(&rays[2]), rays[0].dot(&rays[1]));

@@ -6,7 +6,7 @@ use crate::camera::Camera;
 
 /// Intrinsics of undistorted pixels; depth is measured as disparity `bf / z`, in px.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pinhole {
+pub(crate) struct Pinhole {
     /// Focal length in x, px.
     pub fx: f64,
     /// Focal length in y, px.
@@ -22,14 +22,14 @@ pub struct Pinhole {
 impl Pinhole {
     /// Projects a point given in the camera frame; meaningful for positive z only.
     #[inline]
-    pub fn project(&self, p: &Vector3<f64>) -> [f64; 2] {
+    pub(crate) fn project(&self, p: &Vector3<f64>) -> [f64; 2] {
         let inv_z = 1.0 / p.z;
         [self.fx * p.x * inv_z + self.cx, self.fy * p.y * inv_z + self.cy]
     }
 
     /// The point in the camera frame at undistorted pixel (u, v) and depth `z_m`.
     #[inline]
-    pub fn unproject(&self, u: f64, v: f64, z_m: f64) -> Point3<f64> {
+    pub(crate) fn unproject(&self, u: f64, v: f64, z_m: f64) -> Point3<f64> {
         Point3::new((u - self.cx) / self.fx * z_m, (v - self.cy) / self.fy * z_m, z_m)
     }
 }

@@ -8,12 +8,12 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3, Vector
 const SMALL_ANGLE: f64 = 1e-4;
 
 /// The matrix of the cross product: `skew(v) * w == v × w`.
-pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
 /// Exponential map from (ρ, φ) to a rigid motion.
-pub fn se3_exp(xi: &Vector6<f64>) -> Isometry3<f64> {
+pub(crate) fn se3_exp(xi: &Vector6<f64>) -> Isometry3<f64> {
     let rho = Vector3::new(xi[0], xi[1], xi[2]);
     let phi = Vector3::new(xi[3], xi[4], xi[5]);
     let theta2 = phi.norm_squared();
@@ -31,14 +31,14 @@ pub fn se3_exp(xi: &Vector6<f64>) -> Isometry3<f64> {
 
 /// The pose after a left perturbation, `exp(xi) * pose`, with its quaternion brought back to unit length: an error of rounding
 /// doubles with each product of a pose and an inverse, and constant-velocity prediction makes two such products a frame.
-pub fn perturbed(xi: &Vector6<f64>, pose: &Isometry3<f64>) -> Isometry3<f64> {
+pub(crate) fn perturbed(xi: &Vector6<f64>, pose: &Isometry3<f64>) -> Isometry3<f64> {
     let mut moved = se3_exp(xi) * pose;
     moved.rotation.renormalize();
     moved
 }
 
 /// Logarithm of a rigid motion, the inverse of [`se3_exp`] for rotations below π.
-pub fn se3_log(pose: &Isometry3<f64>) -> Vector6<f64> {
+pub(crate) fn se3_log(pose: &Isometry3<f64>) -> Vector6<f64> {
     let phi = pose.rotation.scaled_axis();
     let theta2 = phi.norm_squared();
     let theta = theta2.sqrt();

@@ -11,11 +11,11 @@ use nalgebra::{
 use super::{Pose, se3_exp, se3_log, skew};
 
 /// A similarity; `s_a_b` maps points given in frame b into frame a.
-pub type Similarity = nalgebra::Similarity3<f64>;
+pub(crate) type Similarity = nalgebra::Similarity3<f64>;
 /// A small similarity: (ρ, φ, σ).
-pub type Tangent = SVector<f64, 7>;
+pub(crate) type Tangent = SVector<f64, 7>;
 /// A linear map of small similarities.
-pub type TangentMap = SMatrix<f64, 7, 7>;
+pub(crate) type TangentMap = SMatrix<f64, 7, 7>;
 
 /// Least difference of the two largest eigenvalues, as a share of the largest, that fixes a rotation: points on a line leave it open.
 const MIN_GAP: f64 = 1e-6;
@@ -23,42 +23,42 @@ const MIN_GAP: f64 = 1e-6;
 const MAX_LOG_SCALE: f64 = 50.0;
 
 /// A rigid motion as a similarity whose scale is 1.
-pub fn unscaled(pose: &Pose) -> Similarity {
+pub(crate) fn unscaled(pose: &Pose) -> Similarity {
     Similarity::from_isometry(*pose, 1.0)
 }
 
 /// The camera pose whose picture of the world is that of `s_cam_world`, in the unit of the world: a picture has no scale.
-pub fn rigid(s_cam_world: &Similarity) -> Pose {
+pub(crate) fn rigid(s_cam_world: &Similarity) -> Pose {
     let Isometry3 { rotation, translation } = s_cam_world.isometry;
     Pose::from_parts((translation.vector / s_cam_world.scaling()).into(), rotation)
 }
 
 /// The inverse of [`rigid`]: the camera pose `t_cam_world` with the camera's side in a unit of which one unit of the world has `scale`.
-pub fn with_scale(t_cam_world: &Pose, scale: f64) -> Similarity {
+pub(crate) fn with_scale(t_cam_world: &Pose, scale: f64) -> Similarity {
     let translation = (t_cam_world.translation.vector * scale).into();
     Similarity::from_isometry(Pose::from_parts(translation, t_cam_world.rotation), scale)
 }
 
 /// The similarity near the identity with these coordinates. It agrees with the exponential map to first order, and where σ is 0 in all.
-pub fn sim3_from_tangent(xi: &Tangent) -> Similarity {
+pub(crate) fn sim3_from_tangent(xi: &Tangent) -> Similarity {
     let scale = xi[6].clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE).exp();
     Similarity::from_isometry(se3_exp(&xi.fixed_rows::<6>(0).into_owned()), scale)
 }
 
 /// The coordinates of a similarity near the identity, the inverse of [`sim3_from_tangent`].
-pub fn sim3_tangent(s: &Similarity) -> Tangent {
+pub(crate) fn sim3_tangent(s: &Similarity) -> Tangent {
     se3_log(&s.isometry).push(s.scaling().ln())
 }
 
 /// A similarity after a left perturbation, with its quaternion brought back to unit length as in [`super::perturbed`].
-pub fn sim3_perturbed(xi: &Tangent, s: &Similarity) -> Similarity {
+pub(crate) fn sim3_perturbed(xi: &Tangent, s: &Similarity) -> Similarity {
     let mut moved = sim3_from_tangent(xi) * s;
     moved.isometry.rotation.renormalize();
     moved
 }
 
 /// The adjoint of a similarity: `S exp(ξ) S⁻¹ = exp(Ad(S) ξ)`.
-pub fn sim3_adjoint(s: &Similarity) -> TangentMap {
+pub(crate) fn sim3_adjoint(s: &Similarity) -> TangentMap {
     let rotation = *s.isometry.rotation.to_rotation_matrix().matrix();
     let translation = s.isometry.translation.vector;
     let mut ad = TangentMap::zeros();
@@ -73,7 +73,7 @@ pub fn sim3_adjoint(s: &Similarity) -> TangentMap {
 /// The similarity that brings the first point of each pair nearest to the second (Horn, Closed-form solution of absolute orientation using
 /// unit quaternions, JOSA A 1987; the scale is the symmetrical one of section 2.D, for both sides have errors). `None` for fewer
 /// than three pairs and for points on a line, which leave it open.
-pub fn absolute_orientation(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Similarity> {
+pub(crate) fn absolute_orientation(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Similarity> {
     let count = pairs.len() as f64;
     let sum = pairs.iter().fold([Vector3::zeros(); 2], |[p, q], pair| [p + pair.0.coords, q + pair.1.coords]);
     let [from, to] = sum.map(|sum| sum / count);

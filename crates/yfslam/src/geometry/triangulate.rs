@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 /// The point midway between two rays where they are nearest to each other; `None` if they do not approach in front of their origins.
-pub fn midpoint(
+pub(crate) fn midpoint(
     center_a: &Vector3<f64>,
     ray_a: &Vector3<f64>,
     center_b: &Vector3<f64>,

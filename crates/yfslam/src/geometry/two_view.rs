@@ -19,7 +19,7 @@ const CHI2_LINE: f64 = 3.84;
 
 /// What the points look like to two cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Model {
+pub(crate) enum Model {
     /// A plane, or so little parallax that it might be one.
     Plane,
     /// Anything else.
@@ -28,7 +28,7 @@ pub enum Model {
 
 /// Two pictures that were understood.
 #[derive(Clone, Debug)]
-pub struct TwoView {
+pub(crate) struct TwoView {
     /// Maps points of the first camera into the second; the baseline has length 1.
     pub t_second_first: Pose,
     /// The point of each pair in the frame of the first camera, in baselines; `None` for those that do not fit. Points with little parallax
@@ -40,7 +40,7 @@ pub struct TwoView {
 
 /// Why two pictures were not understood.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Refused {
+pub(crate) enum Refused {
     /// Fewer pairs than a model needs, or none that fit one.
     #[error("no model fits the matches")]
     NoModel,
@@ -72,7 +72,7 @@ pub enum Refused {
 ///
 /// # Errors
 /// [`Refused`] if the pairs do not tell for certain.
-pub fn reconstruct(
+pub(crate) fn reconstruct(
     camera: &Pinhole,
     config: &MonocularConfig,
     sigma_px: f64,

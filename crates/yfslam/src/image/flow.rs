@@ -35,13 +35,13 @@ impl Default for Flow {
 
 impl Flow {
     /// Takes the next picture in; the one before becomes the last.
-    pub fn push(&mut self, image: &GrayImage) {
+    pub(crate) fn push(&mut self, image: &GrayImage) {
         std::mem::swap(&mut self.last, &mut self.current);
         self.current.build(image);
     }
 
     /// Where a position of the last picture, px, lies in the current one; `None` if it was lost: no texture, or out of the picture.
-    pub fn follow(&self, [x, y]: [f32; 2]) -> Option<[f32; 2]> {
+    pub(crate) fn follow(&self, [x, y]: [f32; 2]) -> Option<[f32; 2]> {
         let pairs = self.last.planes().iter().zip(self.current.planes());
         let (mut dx, mut dy) = (0.0f32, 0.0f32);
         for (level, (last, current)) in pairs.enumerate().rev() {
@@ -59,7 +59,7 @@ impl Flow {
     }
 
     /// Sum of absolute differences of the 3 × 3 px around a position of the last picture and one of the current.
-    pub fn difference(&self, from: [f32; 2], to: [f32; 2]) -> Option<f32> {
+    pub(crate) fn difference(&self, from: [f32; 2], to: [f32; 2]) -> Option<f32> {
         let (last, current) = (self.last.planes().first()?, self.current.planes().first()?);
         let (mut a, mut b) = ([0.0; 9], [0.0; 9]);
         (sample::<3>(last, from, &mut a) && sample::<3>(current, to, &mut b))

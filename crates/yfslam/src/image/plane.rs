@@ -21,7 +21,7 @@ pub(crate) struct Plane {
 
 impl Plane {
     /// Changes the size, keeping the allocation where it suffices; pixel values are unspecified afterwards.
-    pub fn resize(&mut self, width: usize, height: usize) {
+    pub(crate) fn resize(&mut self, width: usize, height: usize) {
         self.width = width;
         self.height = height;
         self.stride = (width + PADDING).next_multiple_of(LANES);
@@ -29,7 +29,7 @@ impl Plane {
     }
 
     /// Becomes a copy of `image`.
-    pub fn copy_from(&mut self, image: &GrayImage) {
+    pub(crate) fn copy_from(&mut self, image: &GrayImage) {
         self.resize(image.width(), image.height());
         for (row, source) in
             self.data.chunks_exact_mut(self.stride).zip(image.data().chunks_exact(image.width().max(1)))
@@ -39,32 +39,32 @@ impl Plane {
     }
 
     /// Pixels per row, padding excluded.
-    pub fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         self.width
     }
 
     /// Rows.
-    pub fn height(&self) -> usize {
+    pub(crate) fn height(&self) -> usize {
         self.height
     }
 
     /// Distance between rows in `data`, px.
-    pub fn stride(&self) -> usize {
+    pub(crate) fn stride(&self) -> usize {
         self.stride
     }
 
     /// All rows with their padding.
-    pub fn data(&self) -> &[u8] {
+    pub(crate) fn data(&self) -> &[u8] {
         &self.data
     }
 
     /// Row `y` with its padding.
-    pub fn row(&self, y: usize) -> &[u8] {
+    pub(crate) fn row(&self, y: usize) -> &[u8] {
         &self.data[y * self.stride..(y + 1) * self.stride]
     }
 
     /// Row `y` with its padding.
-    pub fn row_mut(&mut self, y: usize) -> &mut [u8] {
+    pub(crate) fn row_mut(&mut self, y: usize) -> &mut [u8] {
         &mut self.data[y * self.stride..(y + 1) * self.stride]
     }
 }

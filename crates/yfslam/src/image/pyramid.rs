@@ -22,7 +22,7 @@ pub(crate) struct Pyramid {
 
 impl Pyramid {
     /// An empty pyramid of `planes` images (at least 1), each `scale_factor` (in 1–2) times smaller than the one before.
-    pub fn new(level: Level, planes: usize, scale_factor: f32) -> Self {
+    pub(crate) fn new(level: Level, planes: usize, scale_factor: f32) -> Self {
         let planes = planes.max(1);
         Self {
             level,
@@ -34,7 +34,7 @@ impl Pyramid {
     }
 
     /// Fills all planes from `image`, which becomes the first.
-    pub fn build(&mut self, image: &GrayImage) {
+    pub(crate) fn build(&mut self, image: &GrayImage) {
         let Some((base, rest)) = self.planes.split_first_mut() else { return };
         base.copy_from(image);
         let mut finer = &*base;
@@ -48,12 +48,12 @@ impl Pyramid {
     }
 
     /// Ratio between the scales of neighbouring planes.
-    pub fn scale_factor(&self) -> f32 {
+    pub(crate) fn scale_factor(&self) -> f32 {
         self.scale_factor
     }
 
     /// All planes, finest first.
-    pub fn planes(&self) -> &[Plane] {
+    pub(crate) fn planes(&self) -> &[Plane] {
         &self.planes
     }
 }

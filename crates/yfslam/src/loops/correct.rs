@@ -30,7 +30,7 @@ struct Loop {
 
 /// Closes the loop between `keyframe` and the place of `candidate`, in which it was located as `located`: there, `s_cam_place` maps the
 /// place's world into its camera and unit.
-pub fn close(
+pub(super) fn close(
     context: &Context,
     map: &mut Map,
     keyframe: KeyFrameId,

@@ -20,7 +20,7 @@ const NONE: u32 = u32::MAX;
 
 /// Landmarks to be found by descriptor.
 #[derive(Clone, Debug, Default)]
-pub struct LandmarkIndex {
+pub(super) struct LandmarkIndex {
     items: Vec<Item>,
     /// For each table and key the first item of a chain; empty until the first landmark comes.
     heads: Vec<u32>,
@@ -40,7 +40,7 @@ struct Item {
 
 impl LandmarkIndex {
     /// Enters a landmark with the descriptor that it has now; one that is there already stays as it is.
-    pub fn insert(&mut self, landmark: LandmarkId, descriptor: &Descriptor) {
+    pub(super) fn insert(&mut self, landmark: LandmarkId, descriptor: &Descriptor) {
         if self.known.insert(landmark, ()).is_some() {
             return;
         }
@@ -56,7 +56,7 @@ impl LandmarkIndex {
     }
 
     /// Drops landmarks that the map no longer has, once they outnumber those it has.
-    pub fn tidy(&mut self, map: &Map) {
+    pub(super) fn tidy(&mut self, map: &Map) {
         if self.items.len() > 2 * map.landmark_count() + 1000 {
             let items = std::mem::take(&mut self.items);
             *self = Self::default();
@@ -71,7 +71,12 @@ impl LandmarkIndex {
     /// Calls `visit` with landmarks whose descriptor differs from `query` in at most `max_distance` bits, and the number of those bits.
     /// Most of them, that is: the more bits differ, the more are missed.
     #[inline(always)]
-    pub fn for_each_near(&mut self, query: &Descriptor, max_distance: u32, mut visit: impl FnMut(LandmarkId, u32)) {
+    pub(super) fn for_each_near(
+        &mut self,
+        query: &Descriptor,
+        max_distance: u32,
+        mut visit: impl FnMut(LandmarkId, u32),
+    ) {
         if self.items.is_empty() {
             return;
         }

@@ -14,7 +14,13 @@ use crate::geometry::Similarity;
 use crate::map::{KeyFrameId, Map};
 
 /// Whether the camera can have drifted by `drift` between the two keyframes.
-pub fn is_plausible(config: &LoopConfig, map: &Map, from: KeyFrameId, to: KeyFrameId, drift: &Similarity) -> bool {
+pub(super) fn is_plausible(
+    config: &LoopConfig,
+    map: &Map,
+    from: KeyFrameId,
+    to: KeyFrameId,
+    drift: &Similarity,
+) -> bool {
     // Between two submaps there is no way, and nothing to be explained by it.
     let Some(way) = way_between(map, from, to) else { return false };
     let motion = drift.isometry;

@@ -14,25 +14,25 @@ use crate::mapping::Window;
 
 /// A copied submap that is being adjusted.
 #[derive(Clone, Debug)]
-pub struct GlobalBundle {
+pub(crate) struct GlobalBundle {
     window: Window,
     root: KeyFrameId,
 }
 
 impl GlobalBundle {
     /// Copies the submap of `keyframe`.
-    pub fn copy(sensor: &SensorModel, map: &Map, keyframe: KeyFrameId) -> Option<Self> {
+    pub(crate) fn copy(sensor: &SensorModel, map: &Map, keyframe: KeyFrameId) -> Option<Self> {
         let root = map.root(keyframe)?;
         Some(Self { window: Window::whole(sensor, map, root), root })
     }
 
     /// Adjusts the copy, until `go_on` says no.
-    pub fn adjust(&mut self, config: &BundleConfig, go_on: &dyn Fn() -> bool) {
+    pub(crate) fn adjust(&mut self, config: &BundleConfig, go_on: &dyn Fn() -> bool) {
         self.window.adjust_while(config, go_on);
     }
 
     /// Takes what was adjusted over into the map.
-    pub fn merge(self, sensor: &SensorModel, map: &mut Map) {
+    pub(crate) fn merge(self, sensor: &SensorModel, map: &mut Map) {
         let members = map.submap(self.root);
         let before: SecondaryMap<KeyFrameId, Pose> =
             members.iter().filter_map(|id| Some((*id, map.keyframe(*id)?.t_cam_world))).collect();

@@ -26,9 +26,9 @@ use crate::context::Context;
 use crate::geometry::{Pose, Similarity, rigid, unscaled};
 use crate::map::{KeyFrame, KeyFrameId, Map};
 use crate::tracking::{Match, TrackedFrame};
-pub use global_bundle::GlobalBundle;
+pub(crate) use global_bundle::GlobalBundle;
 use place_recognition::Candidate;
-pub use place_recognition::PlaceRecogniser;
+pub(crate) use place_recognition::PlaceRecogniser;
 use verify::Evidence;
 
 /// A loop that was closed.
@@ -51,7 +51,7 @@ pub struct LoopClosure {
 
 /// Where a camera that is lost can be at most.
 #[derive(Clone, Copy, Debug)]
-pub struct SearchRegion {
+pub(crate) struct SearchRegion {
     /// The keyframe that it was last seen from.
     pub reference: KeyFrameId,
     /// Where it was then, in the world of that keyframe, m.
@@ -71,7 +71,7 @@ impl SearchRegion {
 
 /// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then. Of several places that it may show
 /// the likeliest is taken; one beyond `reach` has to be likelier.
-pub fn relocalise(
+pub(crate) fn relocalise(
     recogniser: &mut PlaceRecogniser,
     context: &Context,
     map: &Map,
@@ -102,7 +102,7 @@ pub fn relocalise(
 
 /// Closes loops.
 #[derive(Clone, Debug, Default)]
-pub struct LoopCloser {
+pub(crate) struct LoopCloser {
     /// Places that the last keyframe resembled, with the number of keyframes in a row that agreed.
     consistent: Vec<(Vec<KeyFrameId>, usize)>,
     /// Sequence number of the keyframe that closed the last loop.
@@ -112,13 +112,13 @@ pub struct LoopCloser {
 
 impl LoopCloser {
     /// Forgets all places and loops.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.consistent.clear();
         self.last_loop = None;
     }
 
     /// Looks whether a new keyframe shows an old place, and closes the loop if so; the map is then to be adjusted as a whole.
-    pub fn close(
+    pub(crate) fn close(
         &mut self,
         context: &Context,
         recogniser: &Mutex<PlaceRecogniser>,

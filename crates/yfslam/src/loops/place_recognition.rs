@@ -12,7 +12,7 @@ use crate::map::{KeyFrameId, LandmarkId, Map};
 
 /// A place that may be the one in the image.
 #[derive(Clone, Debug)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// The keyframe that shares most with the image.
     pub keyframe: KeyFrameId,
     /// That keyframe and its covisible ones.
@@ -23,7 +23,7 @@ pub struct Candidate {
 
 /// Recognises places. Buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub struct PlaceRecogniser {
+pub(crate) struct PlaceRecogniser {
     index: LandmarkIndex,
     hits: Vec<Hit>,
     votes: SecondaryMap<KeyFrameId, Vote>,
@@ -41,7 +41,7 @@ struct Vote {
 
 impl PlaceRecogniser {
     /// Enters the landmarks of a keyframe that other keyframes see too.
-    pub fn learn(&mut self, map: &Map, keyframe: KeyFrameId) {
+    pub(crate) fn learn(&mut self, map: &Map, keyframe: KeyFrameId) {
         let Some(keyframe) = map.keyframe(keyframe) else { return };
         for (_, id) in keyframe.observed() {
             if let Some(landmark) = map.landmark(id).filter(|l| l.observations.len() > 1) {
@@ -52,12 +52,12 @@ impl PlaceRecogniser {
     }
 
     /// Forgets all landmarks.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         *self = Self::default();
     }
 
     /// The places that most resemble an image, best first. Only trusted features count, and only landmarks that `may_count` lets.
-    pub fn candidates(
+    pub(crate) fn candidates(
         &mut self,
         config: &PlaceConfig,
         map: &Map,

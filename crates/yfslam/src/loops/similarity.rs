@@ -14,7 +14,7 @@ use crate::tracking::TrackedFrame;
 
 /// The similarity `s_cam_place` from the world of the old place into the camera of `keyframe`, located there as `located`. `None` if too
 /// few landmarks agree on it.
-pub fn measure(
+pub(super) fn measure(
     context: &Context,
     map: &Map,
     keyframe: KeyFrameId,

@@ -19,7 +19,7 @@ use crate::tracking::{Match, TrackedFrame};
 
 /// What speaks for a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Evidence {
+pub(super) struct Evidence {
     /// Landmarks that fit it.
     pub inliers: usize,
     /// Landmarks that fit it and look the same, as a share of what tracking would find there, going by how often it found each of those
@@ -29,14 +29,14 @@ pub struct Evidence {
 
 impl Evidence {
     /// Whether there is as much of both as `needed`.
-    pub fn suffices(&self, needed: &Self) -> bool {
+    pub(super) fn suffices(&self, needed: &Self) -> bool {
         self.inliers >= needed.inliers && self.match_ratio >= needed.match_ratio
     }
 }
 
 /// Locates `frame` in the place of `candidate`. Pose and matches are then those of the frame. `None` if the evidence is less than
 /// `needed`, or leaves open where the camera is.
-pub fn locate(
+pub(super) fn locate(
     context: &Context,
     map: &Map,
     candidate: &Candidate,

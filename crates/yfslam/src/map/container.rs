@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 
 /// What bytes hold: the words they begin with, and the version of the records that this code writes and reads.
 #[derive(Clone, Copy, Debug)]
-pub struct Section {
+pub(crate) struct Section {
     /// First bytes, such as "yfslam map".
     pub magic: &'static str,
     /// The only version that is read.
@@ -20,9 +20,9 @@ pub struct Section {
 }
 
 /// Keyframes and landmarks, by which a camera finds where it is.
-pub const MAP: Section = Section { magic: "yfslam map", version: 1 };
+pub(crate) const MAP: Section = Section { magic: "yfslam map", version: 1 };
 /// Pieces of a dense map, of which products are made.
-pub const DENSE_MAP: Section = Section { magic: "yfslam dense map", version: 3 };
+pub(crate) const DENSE_MAP: Section = Section { magic: "yfslam dense map", version: 3 };
 
 /// Why bytes cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -70,7 +70,7 @@ pub enum ContainerError {
 
 impl Section {
     /// Bytes of the header.
-    pub const fn header(self) -> usize {
+    pub(crate) const fn header(self) -> usize {
         self.magic.len() + 2 + 8 + 4
     }
 
@@ -78,7 +78,7 @@ impl Section {
     ///
     /// # Errors
     /// If the records cannot be written, which would be a fault of this program.
-    pub fn pack(self, records: &impl Serialize) -> Result<Vec<u8>, ContainerError> {
+    pub(crate) fn pack(self, records: &impl Serialize) -> Result<Vec<u8>, ContainerError> {
         let plain = postcard::to_allocvec(records).map_err(|error| ContainerError::Records(error.to_string()))?;
         let packed = ruzstd::encoding::compress_to_vec(plain.as_slice(), ruzstd::encoding::CompressionLevel::Fastest);
         let mut bytes = Vec::with_capacity(self.header() + packed.len());
@@ -91,7 +91,7 @@ impl Section {
     }
 
     /// Whether bytes begin like this kind.
-    pub fn begins(self, bytes: &[u8]) -> bool {
+    pub(crate) fn begins(self, bytes: &[u8]) -> bool {
         bytes.starts_with(self.magic.as_bytes())
     }
 
@@ -99,7 +99,7 @@ impl Section {
     ///
     /// # Errors
     /// If the bytes are of another kind or version, cut, or altered.
-    pub fn split(self, bytes: &[u8]) -> Result<(PackedSection<'_>, &[u8]), ContainerError> {
+    pub(crate) fn split(self, bytes: &[u8]) -> Result<(PackedSection<'_>, &[u8]), ContainerError> {
         let rest = bytes.strip_prefix(self.magic.as_bytes()).ok_or(ContainerError::Foreign(self.magic))?;
         let cut = |announced: u64| ContainerError::Length { found: bytes.len() as u64, announced };
         let header = self.header() as u64;
@@ -124,7 +124,7 @@ impl Section {
     ///
     /// # Errors
     /// If the bytes are of another kind or version, cut, appended to, or altered.
-    pub fn whole(self, bytes: &[u8]) -> Result<PackedSection<'_>, ContainerError> {
+    pub(crate) fn whole(self, bytes: &[u8]) -> Result<PackedSection<'_>, ContainerError> {
         let (packed, rest) = self.split(bytes)?;
         if rest.is_empty() {
             return Ok(packed);
@@ -137,21 +137,21 @@ impl Section {
     ///
     /// # Errors
     /// As [`Section::whole`], or if they are no records.
-    pub fn unpack<T: DeserializeOwned>(self, bytes: &[u8]) -> Result<T, ContainerError> {
+    pub(crate) fn unpack<T: DeserializeOwned>(self, bytes: &[u8]) -> Result<T, ContainerError> {
         self.whole(bytes)?.unpack()
     }
 }
 
 /// Records as they were packed, checksum proved.
 #[derive(Clone, Copy, Debug)]
-pub struct PackedSection<'a>(&'a [u8]);
+pub(crate) struct PackedSection<'a>(&'a [u8]);
 
 impl PackedSection<'_> {
     /// The records.
     ///
     /// # Errors
     /// If they are none.
-    pub fn unpack<T: DeserializeOwned>(self) -> Result<T, ContainerError> {
+    pub(crate) fn unpack<T: DeserializeOwned>(self) -> Result<T, ContainerError> {
         let wrong = |error: &dyn std::fmt::Display| ContainerError::Records(error.to_string());
         let mut plain = Vec::new();
         let mut decoder = ruzstd::decoding::StreamingDecoder::new(self.0).map_err(|e| wrong(&e))?;

@@ -36,7 +36,7 @@ pub struct KeyFrame {
 
 impl KeyFrame {
     /// The features that see a landmark.
-    pub fn observed(&self) -> impl Iterator<Item = (usize, LandmarkId)> {
+    pub(crate) fn observed(&self) -> impl Iterator<Item = (usize, LandmarkId)> {
         self.landmarks.iter().enumerate().filter_map(|(i, l)| Some((i, (*l)?)))
     }
 }

@@ -42,7 +42,7 @@ pub struct Landmark {
 impl Landmark {
     /// Log-odds of a landmark that nothing speaks against, and the most that is kept: those of OctoMap's greatest probability, 0.97
     /// (Hornung et al., Autonomous Robots 2013).
-    pub const MAX_EXISTENCE_LOG_ODDS: f32 = 3.48;
+    pub(crate) const MAX_EXISTENCE_LOG_ODDS: f32 = 3.48;
     /// What a frame that found it adds: OctoMap's hit, 0.7.
     pub(crate) const MATCHED_LOG_ODDS: f32 = 0.85;
     /// What a frame that saw through it adds: OctoMap's miss, 0.4.
@@ -51,17 +51,17 @@ impl Landmark {
     pub(crate) const MIN_EXISTENCE_LOG_ODDS: f32 = -1.99;
 
     /// Probability that it still stands where it was, as a share of that of a landmark that nothing speaks against.
-    pub fn trust(&self) -> f32 {
+    pub(crate) fn trust(&self) -> f32 {
         (1.0 + (-Self::MAX_EXISTENCE_LOG_ODDS).exp()) / (1.0 + (-self.existence_log_odds).exp())
     }
 
     /// Of the frames that should have seen it, the share that did.
-    pub fn found_ratio(&self) -> f64 {
+    pub(crate) fn found_ratio(&self) -> f64 {
         f64::from(self.found) / f64::from(self.visible.max(1))
     }
 
     /// Feature index in a keyframe, if it sees the landmark.
-    pub fn feature_in(&self, keyframe: KeyFrameId) -> Option<usize> {
+    pub(crate) fn feature_in(&self, keyframe: KeyFrameId) -> Option<usize> {
         self.observations.iter().find(|(k, _)| *k == keyframe).map(|(_, f)| *f as usize)
     }
 }

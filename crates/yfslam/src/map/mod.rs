@@ -9,11 +9,11 @@
 //!    from two of them.
 //! 6. Loop edges are mutual; a keyframe with one stays in the map.
 
-pub mod container;
+pub(crate) mod container;
 mod keyframe;
 mod landmark;
-pub mod ops;
-pub mod persist;
+pub(crate) mod ops;
+pub(crate) mod persist;
 mod restore;
 #[cfg(test)]
 pub(crate) mod scene;
@@ -73,12 +73,12 @@ impl Map {
     }
 
     /// Keyframes ever inserted: the sequence number of the next one.
-    pub fn keyframes_ever(&self) -> u64 {
+    pub(crate) fn keyframes_ever(&self) -> u64 {
         self.keyframes_ever
     }
 
     /// Current `t_cam_world` of a keyframe; for a removed one by way of the ancestor it was tied to.
-    pub fn keyframe_pose(&self, id: KeyFrameId) -> Option<Pose> {
+    pub(crate) fn keyframe_pose(&self, id: KeyFrameId) -> Option<Pose> {
         self.own_pose(id).map(|own| rigid(&own))
     }
 
@@ -89,7 +89,7 @@ impl Map {
     }
 
     /// The keyframe or, if it was removed, the ancestor it was tied to, with `s_asked_found`.
-    pub fn surviving_ancestor(&self, id: KeyFrameId) -> Option<(&KeyFrame, Similarity)> {
+    pub(crate) fn surviving_ancestor(&self, id: KeyFrameId) -> Option<(&KeyFrame, Similarity)> {
         let (mut id, mut s_asked_id) = (id, Similarity::identity());
         loop {
             if let Some(keyframe) = self.keyframes.get(id) {
@@ -103,23 +103,23 @@ impl Map {
 
     /// A frame's pose seen from a keyframe, `t_cam_reference`, in the unit that the keyframe was mapped in: when the map is corrected, its
     /// scale included, the frame follows ([`Map::absolute_pose`]).
-    pub fn relative_pose(&self, reference: KeyFrameId, t_cam_world: &Pose) -> Option<Pose> {
+    pub(crate) fn relative_pose(&self, reference: KeyFrameId, t_cam_world: &Pose) -> Option<Pose> {
         let own = self.own_pose(reference)?;
         Some((with_scale(t_cam_world, own.scaling()) * own.inverse()).isometry)
     }
 
     /// Current `t_cam_world` of a frame that was tied to a keyframe.
-    pub fn absolute_pose(&self, reference: KeyFrameId, t_cam_reference: &Pose) -> Option<Pose> {
+    pub(crate) fn absolute_pose(&self, reference: KeyFrameId, t_cam_reference: &Pose) -> Option<Pose> {
         Some(rigid(&(unscaled(t_cam_reference) * self.own_pose(reference)?)))
     }
 
     /// Whether any keyframe measured depth: else the unit of length is arbitrary.
-    pub fn has_depths(&self) -> bool {
+    pub(crate) fn has_depths(&self) -> bool {
         self.keyframes.values().any(|k| k.features.features.iter().any(|f| f.depth_m.is_some()))
     }
 
     /// Median depth of the landmarks that a keyframe sees; 0 if there are none.
-    pub fn median_depth(&self, keyframe: &KeyFrame) -> f64 {
+    pub(crate) fn median_depth(&self, keyframe: &KeyFrame) -> f64 {
         let landmarks = keyframe.observed().filter_map(|(_, id)| self.landmarks.get(id));
         let mut depths: Vec<f64> = landmarks.map(|l| (keyframe.t_cam_world * l.position).z).collect();
         let middle = depths.len() / 2;
@@ -127,7 +127,7 @@ impl Map {
     }
 
     /// How well a landmark is observed: 2 for each observation with depth, 1 for each without (ORB-SLAM2).
-    pub fn observation_weight(&self, landmark: &Landmark) -> usize {
+    pub(crate) fn observation_weight(&self, landmark: &Landmark) -> usize {
         landmark
             .observations
             .iter()

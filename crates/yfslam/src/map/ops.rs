@@ -8,11 +8,16 @@ use crate::geometry::{Pose, Similarity, rigid};
 use crate::map::{KeyFrame, KeyFrameId, Landmark, LandmarkId, Map};
 
 /// Shared landmarks that make two keyframes covisible. Source: ORB-SLAM2.
-pub const COVISIBLE_MIN_SHARED: usize = 15;
+pub(crate) const COVISIBLE_MIN_SHARED: usize = 15;
 
 impl Map {
     /// Adds a keyframe without observations and outside the spanning tree; [`Map::update_covisibility`] connects it.
-    pub fn insert_keyframe(&mut self, timestamp_ns: i64, t_cam_world: Pose, features: FrameFeatures) -> KeyFrameId {
+    pub(crate) fn insert_keyframe(
+        &mut self,
+        timestamp_ns: i64,
+        t_cam_world: Pose,
+        features: FrameFeatures,
+    ) -> KeyFrameId {
         let sequence = self.keyframes_ever;
         self.keyframes_ever += 1;
         let landmarks = vec![None; features.len()];
@@ -31,7 +36,7 @@ impl Map {
     }
 
     /// Adds a landmark at `position` (world, m) seen by feature `feature` of `keyframe`; replaces what the feature saw before.
-    pub fn insert_landmark(
+    pub(crate) fn insert_landmark(
         &mut self,
         position: Point3<f64>,
         keyframe: KeyFrameId,
@@ -63,7 +68,7 @@ impl Map {
 
     /// Notes that `feature` of `keyframe` sees `landmark`; replaces what the feature saw before. Does nothing if the keyframe sees
     /// the landmark with another feature already.
-    pub fn add_observation(&mut self, landmark: LandmarkId, keyframe: KeyFrameId, feature: usize) {
+    pub(crate) fn add_observation(&mut self, landmark: LandmarkId, keyframe: KeyFrameId, feature: usize) {
         let Some(slot) = self.keyframes.get(keyframe).and_then(|k| k.landmarks.get(feature)) else { return };
         let previous = *slot;
         if previous == Some(landmark) || self.landmarks.get(landmark).is_none_or(|l| l.feature_in(keyframe).is_some()) {
@@ -77,7 +82,7 @@ impl Map {
     }
 
     /// Takes the observation of `landmark` by `keyframe` away; a landmark without observations is removed.
-    pub fn remove_observation(&mut self, landmark: LandmarkId, keyframe: KeyFrameId) {
+    pub(crate) fn remove_observation(&mut self, landmark: LandmarkId, keyframe: KeyFrameId) {
         let Some(l) = self.landmarks.get_mut(landmark) else { return };
         let Some(at) = l.observations.iter().position(|(k, _)| *k == keyframe) else { return };
         let (_, feature) = l.observations.remove(at);
@@ -92,7 +97,7 @@ impl Map {
     }
 
     /// Removes a landmark from the map and from all keyframes.
-    pub fn remove_landmark(&mut self, landmark: LandmarkId) {
+    pub(crate) fn remove_landmark(&mut self, landmark: LandmarkId) {
         if let Some(l) = self.landmarks.remove(landmark) {
             for (keyframe, feature) in l.observations {
                 self.keyframes[keyframe].landmarks[feature as usize] = None;
@@ -101,7 +106,7 @@ impl Map {
     }
 
     /// Hands the observations of `gone` over to `kept` and removes `gone`. Where a keyframe sees both, `kept` keeps its feature.
-    pub fn merge_landmarks(&mut self, kept: LandmarkId, gone: LandmarkId) {
+    pub(crate) fn merge_landmarks(&mut self, kept: LandmarkId, gone: LandmarkId) {
         if kept == gone || !self.landmarks.contains_key(kept) {
             return;
         }
@@ -117,7 +122,7 @@ impl Map {
     }
 
     /// Recomputes descriptor, normal and distance range of a landmark from its observations.
-    pub fn update_landmark(&mut self, landmark: LandmarkId, scale_factors: &[f32]) {
+    pub(crate) fn update_landmark(&mut self, landmark: LandmarkId, scale_factors: &[f32]) {
         let Some(l) = self.landmarks.get(landmark) else { return };
         let mut normal = Vector3::zeros();
         let mut descriptors = Vec::with_capacity(l.observations.len());
@@ -155,21 +160,21 @@ impl Map {
     }
 
     /// Moves a landmark, m.
-    pub fn set_position(&mut self, landmark: LandmarkId, position: Point3<f64>) {
+    pub(crate) fn set_position(&mut self, landmark: LandmarkId, position: Point3<f64>) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.position = position;
         }
     }
 
     /// Moves a keyframe.
-    pub fn set_pose(&mut self, keyframe: KeyFrameId, t_cam_world: Pose) {
+    pub(crate) fn set_pose(&mut self, keyframe: KeyFrameId, t_cam_world: Pose) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
             k.t_cam_world = t_cam_world;
         }
     }
 
     /// Moves a keyframe to where a similarity has it, whose scale is that of the keyframe's unit now to the unit of the world.
-    pub fn set_scaled_pose(&mut self, keyframe: KeyFrameId, s_cam_world: &Similarity) {
+    pub(crate) fn set_scaled_pose(&mut self, keyframe: KeyFrameId, s_cam_world: &Similarity) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
             k.t_cam_world = rigid(s_cam_world);
             k.unit /= s_cam_world.scaling();
@@ -177,14 +182,14 @@ impl Map {
     }
 
     /// Counts a frame that should have seen the landmark.
-    pub fn count_visible(&mut self, landmark: LandmarkId) {
+    pub(crate) fn count_visible(&mut self, landmark: LandmarkId) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.visible += 1;
         }
     }
 
     /// Counts a frame that found the landmark.
-    pub fn count_found(&mut self, landmark: LandmarkId) {
+    pub(crate) fn count_found(&mut self, landmark: LandmarkId) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.found += 1;
             l.existence_log_odds =
@@ -193,7 +198,7 @@ impl Map {
     }
 
     /// Notes a frame that saw through the landmark; one that is likely gone is removed.
-    pub fn count_free_space(&mut self, landmark: LandmarkId) {
+    pub(crate) fn count_free_space(&mut self, landmark: LandmarkId) {
         let Some(l) = self.landmarks.get_mut(landmark) else { return };
         l.existence_log_odds += Landmark::FREE_SPACE_LOG_ODDS;
         if l.existence_log_odds < Landmark::MIN_EXISTENCE_LOG_ODDS {
@@ -203,7 +208,7 @@ impl Map {
 
     /// Recounts which keyframes share landmarks with `keyframe` and updates both sides; a keyframe not yet in the spanning tree
     /// becomes a child of the one it shares most with.
-    pub fn update_covisibility(&mut self, keyframe: KeyFrameId) {
+    pub(crate) fn update_covisibility(&mut self, keyframe: KeyFrameId) {
         let Some(k) = self.keyframes.get(keyframe) else { return };
         let mut seen: Vec<KeyFrameId> = k
             .observed()
@@ -240,7 +245,7 @@ impl Map {
     }
 
     /// Notes that two keyframes closed a loop.
-    pub fn add_loop_edge(&mut self, a: KeyFrameId, b: KeyFrameId) {
+    pub(crate) fn add_loop_edge(&mut self, a: KeyFrameId, b: KeyFrameId) {
         if a == b || !self.keyframes.contains_key(a) || !self.keyframes.contains_key(b) {
             return;
         }
@@ -254,7 +259,7 @@ impl Map {
 
     /// Removes a keyframe with its observations; its children go to its parent. The first keyframe, those outside the spanning tree
     /// and those that closed a loop stay: returns whether it was removed.
-    pub fn remove_keyframe(&mut self, keyframe: KeyFrameId) -> bool {
+    pub(crate) fn remove_keyframe(&mut self, keyframe: KeyFrameId) -> bool {
         let removable = self.keyframes.get(keyframe).filter(|k| k.loop_edges.is_empty());
         let Some(parent) = removable.and_then(|k| k.parent) else { return false };
         let matches: Vec<LandmarkId> = self.keyframes[keyframe].observed().map(|(_, l)| l).collect();
@@ -276,7 +281,7 @@ impl Map {
     }
 
     /// Checks the invariants; an error names the first that is broken. For tests and for maps read from files.
-    pub fn validate(&self) -> Result<(), String> {
+    pub(crate) fn validate(&self) -> Result<(), String> {
         let roots = self.keyframes.iter().filter(|(_, k)| k.parent.is_none()).map(|(id, _)| id);
         let mut submap_of = SecondaryMap::new();
         for root in roots {

@@ -19,7 +19,7 @@ pub use crate::map::container::ContainerError as MapError;
 
 /// A map with what it was made with.
 #[derive(Clone, Debug)]
-pub struct MapParts {
+pub(crate) struct MapParts {
     /// The map.
     pub map: Map,
     /// The camera that saw it.
@@ -87,7 +87,7 @@ struct LandmarkRecord {
 ///
 /// # Errors
 /// If the records cannot be written, which would be a fault of this program.
-pub fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Vec<u8>, MapError> {
+pub(crate) fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Vec<u8>, MapError> {
     MAP.pack(&Records::of(map, camera, features))
 }
 
@@ -95,7 +95,7 @@ pub fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Ve
 ///
 /// # Errors
 /// If the bytes are no map, of another version, cut, altered, or contradict themselves.
-pub fn decode(bytes: &[u8]) -> Result<MapParts, MapError> {
+pub(crate) fn decode(bytes: &[u8]) -> Result<MapParts, MapError> {
     let map = if DENSE_MAP.begins(bytes) { DENSE_MAP.split(bytes)?.1 } else { bytes };
     let records: Records = MAP.unpack(map)?;
     records.into_map().map_err(MapError::Records)
@@ -245,7 +245,7 @@ impl FeatureRecord {
 }
 
 impl CameraRecord {
-    pub fn of(camera: &Camera) -> Self {
+    pub(crate) fn of(camera: &Camera) -> Self {
         Self {
             size: [camera.width as u32, camera.height as u32],
             intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy],
@@ -256,7 +256,7 @@ impl CameraRecord {
         }
     }
 
-    pub fn into_camera(self) -> Camera {
+    pub(crate) fn into_camera(self) -> Camera {
         let ([width, height], [fx, fy, cx, cy]) = (self.size.map(|s| s as usize), self.intrinsics);
         Camera {
             distortion: self.distortion,

@@ -10,18 +10,18 @@ use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds};
 use crate::geometry::{Pose, se3_exp};
 
 /// Points on a wavy wall, and the cameras that pass it.
-pub struct Scene {
+pub(crate) struct Scene {
     pub sensor: SensorModel,
     points: Vec<Point3<f64>>,
 }
 
 /// The camera of the scene.
-pub fn camera() -> Camera {
+pub(crate) fn camera() -> Camera {
     Camera::pinhole(640, 480, 520.0, 510.0, 320.0, 240.0)
 }
 
 impl Scene {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let camera = camera();
         let point = |i: usize| {
             let (x, y) = (0.05 * i as f64 - 1.5, 0.3 * ((i * 7 % 11) as f64 - 5.0) * 0.5);
@@ -32,12 +32,12 @@ impl Scene {
     }
 
     /// True pose `t_cam_world` of camera `k`.
-    pub fn pose(&self, k: usize) -> Pose {
+    pub(crate) fn pose(&self, k: usize) -> Pose {
         se3_exp(&(Vector6::new(-0.15, 0.01, 0.02, 0.0, 0.01, 0.002) * k as f64))
     }
 
     /// Adds camera `k` at `believed` (`t_cam_world`) with landmarks where it believes them, unless `shared` has them already.
-    pub fn add(&self, map: &mut Map, k: usize, believed: &Pose, shared: &[KeyFrameId]) -> KeyFrameId {
+    pub(crate) fn add(&self, map: &mut Map, k: usize, believed: &Pose, shared: &[KeyFrameId]) -> KeyFrameId {
         let pose = self.pose(k);
         let c = &self.sensor.pinhole;
         let mut seen = Vec::new();

@@ -21,7 +21,7 @@ impl Map {
     }
 
     /// The keyframes of the submap with that root, in the order of their slots.
-    pub fn submap(&self, root: KeyFrameId) -> Vec<KeyFrameId> {
+    pub(crate) fn submap(&self, root: KeyFrameId) -> Vec<KeyFrameId> {
         let mut members = vec![root];
         let mut at = 0;
         while let Some(k) = members.get(at).and_then(|id| self.keyframes.get(*id)) {
@@ -33,7 +33,7 @@ impl Map {
     }
 
     /// Number of keyframes in the submap of `keyframe`, counted up to `at_most`.
-    pub fn submap_size(&self, keyframe: KeyFrameId, at_most: usize) -> usize {
+    pub(crate) fn submap_size(&self, keyframe: KeyFrameId, at_most: usize) -> usize {
         self.root(keyframe).map_or(0, |root| self.tree_size(root, at_most))
     }
 
@@ -48,7 +48,7 @@ impl Map {
     }
 
     /// Landmarks that the keyframes see, each once.
-    pub fn landmarks_of(&self, keyframes: &[KeyFrameId]) -> Vec<LandmarkId> {
+    pub(crate) fn landmarks_of(&self, keyframes: &[KeyFrameId]) -> Vec<LandmarkId> {
         let seen = keyframes.iter().filter_map(|id| self.keyframes.get(*id)).flat_map(|k| k.observed());
         let mut landmarks: Vec<LandmarkId> = seen.map(|(_, id)| id).collect();
         landmarks.sort_unstable();
@@ -58,7 +58,7 @@ impl Map {
 
     /// Takes the submap of `keyframe` into the world of that of `parent`: everything in it moves by `s_parents_keyframes`, from its
     /// own world and unit into the other one, and its tree hangs below `parent` by `keyframe`. Does nothing if they are of one submap.
-    pub fn weld(&mut self, keyframe: KeyFrameId, parent: KeyFrameId, s_parents_keyframes: &Similarity) {
+    pub(crate) fn weld(&mut self, keyframe: KeyFrameId, parent: KeyFrameId, s_parents_keyframes: &Similarity) {
         let (Some(root), Some(other)) = (self.root(keyframe), self.root(parent)) else { return };
         if root == other || !self.keyframes.contains_key(keyframe) || !self.keyframes.contains_key(parent) {
             return;
@@ -88,7 +88,7 @@ impl Map {
     }
 
     /// Removes a submap with all its landmarks.
-    pub fn remove_submap(&mut self, root: KeyFrameId) {
+    pub(crate) fn remove_submap(&mut self, root: KeyFrameId) {
         let members = self.submap(root);
         for landmark in self.landmarks_of(&members) {
             self.remove_landmark(landmark);

@@ -5,7 +5,7 @@ use crate::context::Context;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 
 /// Removes young landmarks that are rarely found or seldom observed. Returns those still on probation after `keyframe`.
-pub fn young_landmarks(
+pub(super) fn young_landmarks(
     config: &MappingConfig,
     map: &mut Map,
     keyframe: KeyFrameId,
@@ -29,7 +29,7 @@ pub fn young_landmarks(
 
 /// Removes covisible keyframes of `keyframe` of whose close landmarks nearly all are seen as finely by enough others. Without depth none
 /// is known to be close, and all count.
-pub fn redundant_keyframes(context: &Context, map: &mut Map, keyframe: KeyFrameId) {
+pub(super) fn redundant_keyframes(context: &Context, map: &mut Map, keyframe: KeyFrameId) {
     let (_sensor, _config) = (&context.sensor, &context.config.mapping);
     let Some(k) = map.keyframe(keyframe) else { return };
     let candidates: Vec<KeyFrameId> = k.covisible.iter().map(|(id, _)| *id).collect();

@@ -7,7 +7,12 @@ use crate::mapping::color_at;
 
 /// Makes landmarks of the trusted features of `keyframe` that see none: all within the close limit, and the nearest of the others
 /// until `min_depth_landmarks` features with depth were looked at.
-pub fn new_landmarks(context: &Context, map: &mut Map, keyframe: KeyFrameId, color: &RgbImage) -> Vec<LandmarkId> {
+pub(super) fn new_landmarks(
+    context: &Context,
+    map: &mut Map,
+    keyframe: KeyFrameId,
+    color: &RgbImage,
+) -> Vec<LandmarkId> {
     let (sensor, config) = (&context.sensor, &context.config.mapping);
     let mut created = Vec::new();
     let Some(k) = map.keyframe(keyframe) else { return created };

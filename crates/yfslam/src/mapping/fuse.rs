@@ -8,7 +8,7 @@ use crate::optimize::residual::{CHI2_PIXEL, CHI2_PIXEL_DEPTH};
 use crate::tracking::search::{Best, Projector};
 
 /// Joins duplicates between `keyframe` and its first and second neighbours, both ways.
-pub fn duplicates(context: &Context, map: &mut Map, keyframe: KeyFrameId) {
+pub(crate) fn duplicates(context: &Context, map: &mut Map, keyframe: KeyFrameId) {
     let Context { sensor, config } = context;
     let targets = neighbourhood(config, map, keyframe);
     for &target in &targets {
@@ -45,7 +45,7 @@ fn neighbourhood(config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<KeyFra
 }
 
 /// Projects landmarks into `target`: a feature that fits gets the landmark, or its own is merged with it.
-pub fn fuse_into(context: &Context, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
+pub(crate) fn fuse_into(context: &Context, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
     let Context { sensor, config } = context;
     let Some(k) = map.keyframe(target) else { return };
     let t_cam_world = k.t_cam_world;

@@ -13,18 +13,24 @@ use crate::context::{Context, SensorModel};
 use crate::image::RgbImage;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::tracking::{StartFrame, TrackedFrame, TwoViewMap};
-pub use window::Window;
+pub(crate) use window::Window;
 
 /// Grows and refines the map.
 #[derive(Clone, Debug, Default)]
-pub struct Mapper {
+pub(crate) struct Mapper {
     /// Landmarks still on probation.
     young: Vec<LandmarkId>,
 }
 
 impl Mapper {
     /// Takes a frame into the map and refines the surroundings. Returns the new keyframe.
-    pub fn insert(&mut self, context: &Context, map: &mut Map, frame: &TrackedFrame, color: &RgbImage) -> KeyFrameId {
+    pub(crate) fn insert(
+        &mut self,
+        context: &Context,
+        map: &mut Map,
+        frame: &TrackedFrame,
+        color: &RgbImage,
+    ) -> KeyFrameId {
         let Context { sensor, config } = context;
         let keyframe = self.add_keyframe(context, map, frame, color);
         self.young = cull::young_landmarks(&config.mapping, map, keyframe, std::mem::take(&mut self.young));
@@ -42,7 +48,7 @@ impl Mapper {
     }
 
     /// Begins a map, or a submap, with the two frames of a camera without depth. Returns the second keyframe.
-    pub fn begin(&mut self, sensor: &SensorModel, map: &mut Map, start: &TwoViewMap) -> KeyFrameId {
+    pub(crate) fn begin(&mut self, sensor: &SensorModel, map: &mut Map, start: &TwoViewMap) -> KeyFrameId {
         let [first, second] = [&start.first, &start.second].map(|StartFrame { frame, .. }| {
             map.insert_keyframe(frame.timestamp_ns, frame.t_cam_world, frame.features.clone())
         });
@@ -59,7 +65,7 @@ impl Mapper {
     }
 
     /// Starts over with an empty list of young landmarks.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.young.clear();
     }
 

@@ -15,7 +15,12 @@ use crate::tracking::search::Best;
 const CHI2_LINE: f64 = 3.84;
 
 /// Matches features without landmark between `keyframe` and its best covisible ones and triangulates them.
-pub fn new_landmarks(context: &Context, map: &mut Map, keyframe: KeyFrameId, color: &RgbImage) -> Vec<LandmarkId> {
+pub(super) fn new_landmarks(
+    context: &Context,
+    map: &mut Map,
+    keyframe: KeyFrameId,
+    color: &RgbImage,
+) -> Vec<LandmarkId> {
     let Context { sensor, config } = context;
     let mut created = Vec::new();
     let Some(k) = map.keyframe(keyframe) else { return created };

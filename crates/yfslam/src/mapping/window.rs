@@ -10,7 +10,7 @@ use crate::optimize::schur::{BundleProblem, BundleSummary, Observation};
 
 /// A copied part of the map: keyframes to adjust, all they see, and keyframes that hold it in place.
 #[derive(Clone, Debug)]
-pub struct Window {
+pub(crate) struct Window {
     problem: BundleProblem,
     keyframes: Vec<KeyFrameId>,
     landmarks: Vec<LandmarkId>,
@@ -18,7 +18,7 @@ pub struct Window {
 
 impl Window {
     /// Copies `keyframe`, its best covisible ones, their landmarks, and the keyframes outside that see most of those.
-    pub fn copy(context: &Context, map: &Map, keyframe: KeyFrameId) -> Option<Self> {
+    pub(crate) fn copy(context: &Context, map: &Map, keyframe: KeyFrameId) -> Option<Self> {
         let (sensor, config) = (&context.sensor, &context.config.mapping);
         let center = map.keyframe(keyframe)?;
         let mut keyframes = vec![keyframe];
@@ -43,7 +43,7 @@ impl Window {
     }
 
     /// Copies the whole submap with that root; all keyframes but the root are adjusted.
-    pub fn whole(sensor: &SensorModel, map: &Map, root: KeyFrameId) -> Self {
+    pub(crate) fn whole(sensor: &SensorModel, map: &Map, root: KeyFrameId) -> Self {
         let members = map.submap(root);
         let landmarks = map.landmarks_of(&members);
         // In the order of time, in which the equations are nearly a band; the root, which stays, goes last.
@@ -56,12 +56,12 @@ impl Window {
     }
 
     /// The keyframes that were copied.
-    pub fn keyframes(&self) -> &[KeyFrameId] {
+    pub(crate) fn keyframes(&self) -> &[KeyFrameId] {
         &self.keyframes
     }
 
     /// The landmarks that were copied, in the order of their ids.
-    pub fn landmarks(&self) -> &[LandmarkId] {
+    pub(crate) fn landmarks(&self) -> &[LandmarkId] {
         &self.landmarks
     }
 
@@ -95,12 +95,12 @@ impl Window {
     }
 
     /// Adjusts the copy: a few robust steps, outliers out, then more steps.
-    pub fn adjust(&mut self, config: &BundleConfig) -> BundleSummary {
+    pub(crate) fn adjust(&mut self, config: &BundleConfig) -> BundleSummary {
         self.adjust_while(config, &|| true)
     }
 
     /// As [`Window::adjust`], until `go_on` says no, which is asked before each step.
-    pub fn adjust_while(&mut self, config: &BundleConfig, go_on: &dyn Fn() -> bool) -> BundleSummary {
+    pub(crate) fn adjust_while(&mut self, config: &BundleConfig, go_on: &dyn Fn() -> bool) -> BundleSummary {
         let first = self.problem.solve_while(config, config.first_iterations, true, go_on);
         self.problem.drop_outliers();
         let second = self.problem.solve_while(config, config.second_iterations, false, go_on);
@@ -109,7 +109,7 @@ impl Window {
     }
 
     /// Writes the adjusted poses and points back and takes out observations that did not fit. What the map no longer has is skipped.
-    pub fn merge(self, sensor: &SensorModel, map: &mut Map) {
+    pub(crate) fn merge(self, sensor: &SensorModel, map: &mut Map) {
         for (id, pose) in self.keyframes.iter().zip(&self.problem.poses).take(self.problem.free_poses) {
             map.set_pose(*id, *pose);
         }

@@ -4,8 +4,8 @@
 //! poses and points together, [`pose_graph`] reconciles poses with motions measured between them, [`similarity`] aligns two maps.
 
 mod damped;
-pub mod pose_graph;
-pub mod pose_only;
-pub mod residual;
-pub mod schur;
-pub mod similarity;
+pub(crate) mod pose_graph;
+pub(crate) mod pose_only;
+pub(crate) mod residual;
+pub(crate) mod schur;
+pub(crate) mod similarity;

@@ -19,7 +19,7 @@ const SCALED: usize = 7;
 
 /// A motion measured between two poses.
 #[derive(Clone, Copy, Debug)]
-pub struct Edge {
+pub(crate) struct Edge {
     /// Index of pose a.
     pub a: usize,
     /// Index of pose b.
@@ -30,7 +30,7 @@ pub struct Edge {
 
 /// Poses and the motions between them.
 #[derive(Clone, Debug, Default)]
-pub struct PoseGraph {
+pub(crate) struct PoseGraph {
     /// `s_a_world` of each pose; the first stays where it is.
     pub poses: Vec<Similarity>,
     /// Motions measured.
@@ -40,7 +40,7 @@ pub struct PoseGraph {
 impl PoseGraph {
     /// Minimises the squared errors of all edges by Levenberg-Marquardt; the poses are updated in place. Unless the scale may drift, all
     /// scales must be 1 and remain so. Returns the cost before and after.
-    pub fn solve(&mut self, config: &PoseGraphConfig, scale_drifts: bool) -> (f64, f64) {
+    pub(crate) fn solve(&mut self, config: &PoseGraphConfig, scale_drifts: bool) -> (f64, f64) {
         if scale_drifts { self.solve_for::<SCALED>(config) } else { self.solve_for::<RIGID>(config) }
     }
 

@@ -11,7 +11,7 @@ use crate::optimize::residual::{Measurement, huber, projection_jacobian};
 
 /// A landmark seen in the frame whose pose is wanted.
 #[derive(Clone, Copy, Debug)]
-pub struct PoseObservation {
+pub(crate) struct PoseObservation {
     /// The landmark in the world, m.
     pub point_world: Point3<f64>,
     /// Where it was seen.
@@ -26,7 +26,7 @@ pub struct PoseObservation {
 ///
 /// Each round starts from the observations that fitted the last; the robust kernel is dropped after
 /// `robust_rounds`, when the gross errors are gone.
-pub fn optimize_pose(
+pub(crate) fn optimize_pose(
     camera: &Pinhole,
     config: &PoseOptimizerConfig,
     t_cam_world: &mut Pose,
@@ -49,13 +49,17 @@ pub fn optimize_pose(
 
 /// Returns the covariance of a left perturbation (translation m, rotation rad) of `t_cam_world` that follows from the noise of the
 /// inliers, landmarks taken as exact; `None` where the inliers leave a direction open.
-pub fn pose_covariance(camera: &Pinhole, t_cam_world: &Pose, observations: &[PoseObservation]) -> Option<Matrix6<f64>> {
+pub(crate) fn pose_covariance(
+    camera: &Pinhole,
+    t_cam_world: &Pose,
+    observations: &[PoseObservation],
+) -> Option<Matrix6<f64>> {
     let (h, ..) = linearise(camera, false, t_cam_world, observations);
     h.try_inverse().filter(|covariance| covariance.diagonal().iter().all(|variance| *variance >= 0.0))
 }
 
 /// Returns the standard deviation of the camera's position at `t_cam_world`, m; infinite where the inliers leave it open.
-pub fn position_sigma_m(camera: &Pinhole, t_cam_world: &Pose, observations: &[PoseObservation]) -> f64 {
+pub(crate) fn position_sigma_m(camera: &Pinhole, t_cam_world: &Pose, observations: &[PoseObservation]) -> f64 {
     let (h, ..) = linearise(camera, false, t_cam_world, observations);
     // A left perturbation moves the camera by its translation part.
     let covariance = h.try_inverse().map(|inverse| inverse.fixed_view::<3, 3>(0, 0).trace());

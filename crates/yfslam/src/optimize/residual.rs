@@ -9,13 +9,13 @@ use nalgebra::{Matrix3, Vector3};
 use crate::geometry::Pinhole;
 
 /// 95 % quantile of χ² with two degrees of freedom: limit for features without depth.
-pub const CHI2_PIXEL: f64 = 5.991;
+pub(crate) const CHI2_PIXEL: f64 = 5.991;
 /// 95 % quantile of χ² with three degrees of freedom: limit for features with depth.
-pub const CHI2_PIXEL_DEPTH: f64 = 7.815;
+pub(crate) const CHI2_PIXEL_DEPTH: f64 = 7.815;
 
 /// What was measured of a point in one image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Measurement {
+pub(crate) struct Measurement {
     /// Undistorted column, px.
     pub u: f64,
     /// Undistorted row, px.
@@ -31,33 +31,33 @@ pub struct Measurement {
 impl Measurement {
     /// The χ² limit that suits the number of components measured.
     #[inline]
-    pub fn chi2_limit(&self) -> f64 {
+    pub(crate) fn chi2_limit(&self) -> f64 {
         if self.weight_disparity > 0.0 { CHI2_PIXEL_DEPTH } else { CHI2_PIXEL }
     }
 
     /// Measured minus predicted for the point `p` in the camera frame.
     #[inline]
-    pub fn residual(&self, camera: &Pinhole, p: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn residual(&self, camera: &Pinhole, p: &Vector3<f64>) -> Vector3<f64> {
         let [u, v] = camera.project(p);
         Vector3::new(self.u - u, self.v - v, self.disparity - camera.bf / p.z)
     }
 
     /// Squared Mahalanobis norm of a residual.
     #[inline]
-    pub fn chi2(&self, r: &Vector3<f64>) -> f64 {
+    pub(crate) fn chi2(&self, r: &Vector3<f64>) -> f64 {
         (r.x * r.x + r.y * r.y) * self.weight_px + r.z * r.z * self.weight_disparity
     }
 
     /// The diagonal of the information matrix.
     #[inline]
-    pub fn information(&self) -> Vector3<f64> {
+    pub(crate) fn information(&self) -> Vector3<f64> {
         Vector3::new(self.weight_px, self.weight_px, self.weight_disparity)
     }
 }
 
 /// Jacobian of (û, v̂, bf/ẑ) by the point in the camera frame.
 #[inline]
-pub fn projection_jacobian(camera: &Pinhole, p: &Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn projection_jacobian(camera: &Pinhole, p: &Vector3<f64>) -> Matrix3<f64> {
     let iz = 1.0 / p.z;
     let iz2 = iz * iz;
     Matrix3::new(
@@ -75,7 +75,7 @@ pub fn projection_jacobian(camera: &Pinhole, p: &Vector3<f64>) -> Matrix3<f64> {
 
 /// Huber's loss of χ² with the limit given as χ²: (cost, weight of the residual).
 #[inline]
-pub fn huber(chi2: f64, limit: f64) -> (f64, f64) {
+pub(crate) fn huber(chi2: f64, limit: f64) -> (f64, f64) {
     if chi2 <= limit {
         (chi2, 1.0)
     } else {

@@ -16,7 +16,7 @@ type Matrix6x3 = SMatrix<f64, 6, 3>;
 
 /// One matched of a point from a pose.
 #[derive(Clone, Copy, Debug)]
-pub struct Observation {
+pub(crate) struct Observation {
     /// Index into [`BundleProblem::poses`].
     pub pose: usize,
     /// Index into [`BundleProblem::points`].
@@ -29,7 +29,7 @@ pub struct Observation {
 
 /// A window of the map, copied, to be adjusted.
 #[derive(Clone, Debug)]
-pub struct BundleProblem {
+pub(crate) struct BundleProblem {
     /// The camera all poses share.
     pub camera: Pinhole,
     /// `t_cam_world` of each keyframe; the first `free_poses` are adjusted, the others hold the window in place.
@@ -44,7 +44,7 @@ pub struct BundleProblem {
 
 /// How an adjustment went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BundleSummary {
+pub(crate) struct BundleSummary {
     /// Steps taken.
     pub iterations: usize,
     /// Robust cost at the start.
@@ -55,12 +55,12 @@ pub struct BundleSummary {
 
 impl BundleProblem {
     /// Minimises the robust cost by at most `iterations` steps; poses and points are updated in place.
-    pub fn solve(&mut self, config: &BundleConfig, iterations: usize, robust: bool) -> BundleSummary {
+    pub(crate) fn solve(&mut self, config: &BundleConfig, iterations: usize, robust: bool) -> BundleSummary {
         self.solve_while(config, iterations, robust, &|| true)
     }
 
     /// As [`BundleProblem::solve`], until `go_on` says no, which is asked before each step.
-    pub fn solve_while(
+    pub(crate) fn solve_while(
         &mut self,
         config: &BundleConfig,
         iterations: usize,
@@ -111,7 +111,7 @@ impl BundleProblem {
     /// Standard deviation of the first camera's place as seen from the second, as a share of the distance between them: how well two views
     /// tell the direction of their motion, going by the noise of what they see. Their scale, which they leave open, is taken as known.
     /// Infinite for anything but two poses of which one is free.
-    pub fn two_view_sigma(&self) -> f64 {
+    pub(crate) fn two_view_sigma(&self) -> f64 {
         let ([pose, fixed], 1) = (self.poses.as_slice(), self.free_poses) else { return f64::INFINITY };
         let mut system = NormalEquations::new(self);
         system.linearise(self, false);
@@ -149,7 +149,7 @@ impl BundleProblem {
     }
 
     /// Sets the trust of observations that fail the χ² test, or lie behind their camera, to 0; returns how many failed.
-    pub fn drop_outliers(&mut self) -> usize {
+    pub(crate) fn drop_outliers(&mut self) -> usize {
         let mut dropped = 0;
         for i in 0..self.observations.len() {
             let o = self.observations[i];

@@ -17,7 +17,7 @@ const MIN_DEPTH: f64 = 1e-3;
 
 /// A point as two maps have it, a and b, each in its own unit of length.
 #[derive(Clone, Copy, Debug)]
-pub struct Correspondence {
+pub(crate) struct Correspondence {
     /// The point of a, in a camera that belongs to a.
     pub in_a: Point3<f64>,
     /// What that camera saw of it.
@@ -34,7 +34,7 @@ pub struct Correspondence {
 
 impl Correspondence {
     /// Whether each point, brought over by `s_b_a`, is where the other map's camera saw it.
-    pub fn fits(&self, camera: &Pinhole, s_b_a: &Similarity) -> bool {
+    pub(crate) fn fits(&self, camera: &Pinhole, s_b_a: &Similarity) -> bool {
         self.views(s_b_a, &s_b_a.inverse()).iter().all(|view| {
             let m = &view.measurement;
             view.point.z > MIN_DEPTH && m.chi2(&m.residual(camera, &view.point)) <= CHI2_LIMIT
@@ -72,7 +72,7 @@ fn by_perturbation(p: &Vector3<f64>) -> SMatrix<f64, 3, 7> {
 }
 
 /// Refines `s_b_a` in place and marks the inliers; returns their number. Rounds are those of [`super::pose_only::optimize_pose`].
-pub fn optimize_similarity(
+pub(crate) fn optimize_similarity(
     camera: &Pinhole,
     config: &PoseOptimizerConfig,
     s_b_a: &mut Similarity,

@@ -10,7 +10,7 @@ use crate::system::SetupError;
 
 /// The detections of a frame. Buffers are reused.
 #[derive(Default)]
-pub struct FrameDetections {
+pub(super) struct FrameDetections {
     /// Names of the detector's classes; none without a detector.
     pub class_names: Vec<String>,
     /// Indices of the classes that can move.
@@ -30,7 +30,7 @@ impl FrameDetections {
     ///
     /// # Errors
     /// If the detector lacks a movable class.
-    pub fn new(config: &DynamicConfig, detector: Option<&dyn Detector>) -> Result<Self, SetupError> {
+    pub(super) fn new(config: &DynamicConfig, detector: Option<&dyn Detector>) -> Result<Self, SetupError> {
         let Some(detector) = detector else { return Ok(Self::default()) };
         let class_names = detector.class_names().to_vec();
         let index = |name: &String| {
@@ -42,19 +42,19 @@ impl FrameDetections {
     }
 
     /// Returns whether the detector has classes of objects that cannot move.
-    pub fn detects_static_classes(&self) -> bool {
+    pub(super) fn detects_static_classes(&self) -> bool {
         (0..self.class_names.len()).any(|class| !self.movable_classes.contains(&class))
     }
 
     /// Empties the buffers for the next frame.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.movable.clear();
         self.static_objects.clear();
         (self.mask, self.detected) = (None, false);
     }
 
     /// Takes the output of the detector.
-    pub fn take(&mut self, output: &DetectorOutput) {
+    pub(super) fn take(&mut self, output: &DetectorOutput) {
         let can_move = |one: &&Detection| self.movable_classes.contains(&one.class);
         self.movable.extend(output.detections.iter().filter(can_move));
         self.static_objects.extend(output.detections.iter().filter(|one| !can_move(one)));
@@ -64,7 +64,7 @@ impl FrameDetections {
 
     /// Returns the detections of objects that cannot move, at any score; `None` where no detector with such classes has processed the
     /// frame.
-    pub fn static_objects(&self) -> Option<&[Detection]> {
+    pub(super) fn static_objects(&self) -> Option<&[Detection]> {
         self.detected.then_some(&self.static_objects)
     }
 }

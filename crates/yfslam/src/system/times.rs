@@ -41,12 +41,12 @@ pub(super) struct Stopwatch(Instant);
 
 impl Stopwatch {
     /// Starts to measure.
-    pub fn start() -> Self {
+    pub(super) fn start() -> Self {
         Self(Instant::now())
     }
 
     /// Returns the time since the start or the last lap.
-    pub fn lap(&mut self) -> Duration {
+    pub(super) fn lap(&mut self) -> Duration {
         let now = Instant::now();
         now.duration_since(std::mem::replace(&mut self.0, now))
     }

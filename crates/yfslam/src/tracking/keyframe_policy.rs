@@ -6,7 +6,7 @@ use crate::tracking::tracked_frame::TrackedFrame;
 
 /// What the decision is made from.
 #[derive(Clone, Copy, Debug)]
-pub struct FrameSummary {
+pub(crate) struct FrameSummary {
     /// Matched landmarks that fit the pose.
     pub inliers: usize,
     /// Frames since the last keyframe.
@@ -16,7 +16,7 @@ pub struct FrameSummary {
 }
 
 /// Decides from the share of the reference keyframe's landmarks still tracked, and from close features not tracked.
-pub fn is_keyframe_wanted(
+pub(crate) fn is_keyframe_wanted(
     context: &Context,
     map: &Map,
     reference: KeyFrameId,

@@ -10,7 +10,7 @@ use crate::tracking::tracked_frame::TrackedFrame;
 
 /// Keyframes and landmarks around the camera. Buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub struct LocalMap {
+pub(super) struct LocalMap {
     /// Keyframes, those sharing most landmarks with the frame first.
     pub keyframes: Vec<KeyFrameId>,
     /// Landmarks of those keyframes that the frame is not matched to.
@@ -23,7 +23,7 @@ pub struct LocalMap {
 
 impl LocalMap {
     /// Collects the surroundings of what `frame` sees. Returns the keyframe that shares most with it.
-    pub fn update(&mut self, config: &TrackingConfig, map: &Map, frame: &TrackedFrame) -> Option<KeyFrameId> {
+    pub(super) fn update(&mut self, config: &TrackingConfig, map: &Map, frame: &TrackedFrame) -> Option<KeyFrameId> {
         self.update += 1;
         self.votes.clear();
         for matched in frame.matches.iter().flatten() {

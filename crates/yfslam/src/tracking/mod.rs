@@ -3,9 +3,9 @@
 //! In: a frame's features with trust. Out: its pose and matches, and whether it should become a keyframe.
 //! The tracker only reads the map; what it saw of it is noted in [`ObservationCounts`].
 
-pub mod keyframe_policy;
+pub(crate) mod keyframe_policy;
 mod local_map;
-pub mod search;
+pub(crate) mod search;
 mod state;
 mod tracked_frame;
 mod two_view_initialiser;
@@ -21,13 +21,13 @@ use keyframe_policy::{FrameSummary, is_keyframe_wanted};
 use local_map::LocalMap;
 use search::{search_keyframe, search_last_frame, search_local_map};
 pub use state::{LostReason, TrackingState};
-pub use tracked_frame::{Match, TrackedFrame};
-pub use two_view_initialiser::{StartFrame, TwoViewInitialiser, TwoViewMap};
+pub(crate) use tracked_frame::{Match, TrackedFrame};
+pub(crate) use two_view_initialiser::{StartFrame, TwoViewInitialiser, TwoViewMap};
 use visibility_check::is_free_space;
 
 /// Landmarks that frames should have seen, and those that they saw; one may stand there more than once.
 #[derive(Clone, Debug, Default)]
-pub struct ObservationCounts {
+pub(crate) struct ObservationCounts {
     /// In view.
     pub visible: Vec<LandmarkId>,
     /// FrameDetections, and fitting the pose.
@@ -38,7 +38,7 @@ pub struct ObservationCounts {
 
 impl ObservationCounts {
     /// Forgets all.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.visible.clear();
         self.found.clear();
         self.in_free_space.clear();
@@ -47,7 +47,7 @@ impl ObservationCounts {
 
 /// Follows the camera from frame to frame.
 #[derive(Clone, Debug, Default)]
-pub struct Tracker {
+pub(crate) struct Tracker {
     /// The frame being tracked.
     pub current: TrackedFrame,
     last: TrackedFrame,
@@ -68,14 +68,14 @@ pub struct Tracker {
 
 impl Tracker {
     /// Makes room for the next frame: the current one becomes the last.
-    pub fn begin_frame(&mut self, timestamp_ns: i64) {
+    pub(crate) fn begin_frame(&mut self, timestamp_ns: i64) {
         std::mem::swap(&mut self.current, &mut self.last);
         self.current.begin(timestamp_ns);
         self.frames_since_keyframe += 1;
     }
 
     /// The constant-velocity prediction of the pose of the current frame, `t_cam_world`.
-    pub fn predict(&self, map: &Map) -> Pose {
+    pub(crate) fn predict(&self, map: &Map) -> Pose {
         self.velocity.unwrap_or_else(Pose::identity) * self.last.pose_in(map)
     }
 
@@ -84,7 +84,7 @@ impl Tracker {
     ///
     /// # Errors
     /// The reason, if the pose is not known.
-    pub fn track(
+    pub(crate) fn track(
         &mut self,
         context: &Context,
         map: &Map,
@@ -147,7 +147,12 @@ impl Tracker {
     ///
     /// # Errors
     /// If fewer than `min_inliers` landmarks fit.
-    pub fn track_local_map(&mut self, context: &Context, map: &Map, min_inliers: usize) -> Result<(), LostReason> {
+    pub(crate) fn track_local_map(
+        &mut self,
+        context: &Context,
+        map: &Map,
+        min_inliers: usize,
+    ) -> Result<(), LostReason> {
         let c = &context.config.tracking;
         for matched in &mut self.current.matches {
             // Borrowed points have done their work: the refined pose rests on the map alone.
@@ -177,7 +182,7 @@ impl Tracker {
     }
 
     /// Notes landmarks that the frame, once tracked, sees through.
-    pub fn check_visibility(&mut self, context: &Context, map: &Map, depth: &DepthImage) {
+    pub(crate) fn check_visibility(&mut self, context: &Context, map: &Map, depth: &DepthImage) {
         let (sensor, config) = (&context.sensor, &context.config.dynamic.full);
         // As much as there can be: later frames shall not have to ask for memory.
         self.found.clear();
@@ -194,7 +199,7 @@ impl Tracker {
     }
 
     /// Ends a tracked frame: relative_poses it to its reference and learns the motion.
-    pub fn accept(&mut self, map: &Map) {
+    pub(crate) fn accept(&mut self, map: &Map) {
         self.velocity = self.last.reference.map(|_| self.current.t_cam_world * self.last.t_cam_world.inverse());
         if let Some(reference) = self.reference {
             self.current.attach_to(reference, map);
@@ -202,12 +207,12 @@ impl Tracker {
     }
 
     /// Forgets the motion: the last frame's pose is not one to measure it from.
-    pub fn reset_velocity(&mut self) {
+    pub(crate) fn reset_velocity(&mut self) {
         self.velocity = None;
     }
 
     /// Ends a frame that could not be tracked: its pose stays that of the last one.
-    pub fn reject(&mut self) {
+    pub(crate) fn reject(&mut self) {
         self.velocity = None;
         self.current.clear_matches();
         self.current.t_cam_world = self.last.t_cam_world;
@@ -216,7 +221,7 @@ impl Tracker {
     }
 
     /// Whether the current frame should become a keyframe.
-    pub fn wants_keyframe(&self, context: &Context, map: &Map) -> bool {
+    pub(crate) fn wants_keyframe(&self, context: &Context, map: &Map) -> bool {
         let Some(reference) = self.reference else { return true };
         let frames_since = self.frames_since_keyframe;
         let summary = FrameSummary { inliers: self.inliers, frames_since, fps: context.sensor.camera.fps };
@@ -224,17 +229,17 @@ impl Tracker {
     }
 
     /// Notes that the current frame was handed over to become a keyframe.
-    pub fn keyframe_requested(&mut self) {
+    pub(crate) fn keyframe_requested(&mut self) {
         self.frames_since_keyframe = 0;
     }
 
     /// Notes that an earlier frame became a keyframe.
-    pub fn adopt_reference(&mut self, keyframe: KeyFrameId) {
+    pub(crate) fn adopt_reference(&mut self, keyframe: KeyFrameId) {
         self.reference = Some(keyframe);
     }
 
     /// Notes that the current frame became a keyframe, and takes the pose and matches that mapping gave it.
-    pub fn keyframe_inserted(&mut self, keyframe: KeyFrameId, map: &Map) {
+    pub(crate) fn keyframe_inserted(&mut self, keyframe: KeyFrameId, map: &Map) {
         self.reference = Some(keyframe);
         let Some(k) = map.keyframe(keyframe) else { return };
         self.current.t_cam_world = k.t_cam_world;
@@ -245,12 +250,12 @@ impl Tracker {
     }
 
     /// The keyframe that the last tracked frame shares most with.
-    pub fn reference(&self) -> Option<KeyFrameId> {
+    pub(crate) fn reference(&self) -> Option<KeyFrameId> {
         self.reference
     }
 
     /// Forgets everything but its buffers, as after a start.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.velocity = None;
         self.reference = None;
         self.frames_since_keyframe = 0;

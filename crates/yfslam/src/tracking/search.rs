@@ -14,7 +14,7 @@ use crate::map::{KeyFrame, LandmarkId, Map};
 use crate::tracking::tracked_frame::{Match, TrackedFrame};
 
 /// The camera pose in the form projection loops want.
-pub struct Projector<'a> {
+pub(crate) struct Projector<'a> {
     sensor: &'a SensorModel,
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
@@ -24,7 +24,7 @@ pub struct Projector<'a> {
 
 /// A point projected into the image.
 #[derive(Clone, Copy, Debug)]
-pub struct Projection {
+pub(crate) struct Projection {
     /// Undistorted column, px.
     pub u: f32,
     /// Undistorted row, px.
@@ -35,7 +35,7 @@ pub struct Projection {
 
 impl<'a> Projector<'a> {
     /// Prepares projections into the camera at `t_cam_world`.
-    pub fn new(sensor: &'a SensorModel, t_cam_world: &Isometry3<f64>) -> Self {
+    pub(crate) fn new(sensor: &'a SensorModel, t_cam_world: &Isometry3<f64>) -> Self {
         Self {
             sensor,
             rotation: *t_cam_world.rotation.to_rotation_matrix().matrix(),
@@ -46,7 +46,7 @@ impl<'a> Projector<'a> {
 
     /// Projects a world point; `None` behind the camera or outside the image.
     #[inline]
-    pub fn project(&self, point_world: &Point3<f64>) -> Option<Projection> {
+    pub(crate) fn project(&self, point_world: &Point3<f64>) -> Option<Projection> {
         let p = self.rotation * point_world.coords + self.translation;
         if p.z <= 0.01 {
             return None;
@@ -58,7 +58,7 @@ impl<'a> Projector<'a> {
 
     /// Whether a feature's depth is compatible with the projection: their disparities differ by less than `radius` px.
     #[inline]
-    pub fn depth_agrees(&self, depth_m: Option<f32>, projection: &Projection, radius: f32) -> bool {
+    pub(crate) fn depth_agrees(&self, depth_m: Option<f32>, projection: &Projection, radius: f32) -> bool {
         let bf = self.sensor.pinhole.bf as f32;
         depth_m.is_none_or(|z| (bf / z - bf / projection.z_m).abs() <= radius)
     }
@@ -66,7 +66,7 @@ impl<'a> Projector<'a> {
 
 /// The two nearest descriptors seen so far, with the octave of each.
 #[derive(Clone, Copy, Debug)]
-pub struct Best {
+pub(crate) struct Best {
     /// Index of the nearest feature.
     pub index: usize,
     /// Its Hamming distance.
@@ -78,13 +78,13 @@ pub struct Best {
 
 impl Best {
     /// Nothing seen yet.
-    pub fn none() -> Self {
+    pub(crate) fn none() -> Self {
         Self { index: usize::MAX, distance: u32::MAX, octave: 0, second_distance: u32::MAX, second_octave: 0 }
     }
 
     /// Takes a candidate into account.
     #[inline]
-    pub fn offer(&mut self, index: usize, distance: u32, octave: u8) {
+    pub(crate) fn offer(&mut self, index: usize, distance: u32, octave: u8) {
         if distance < self.distance {
             (self.second_distance, self.second_octave) = (self.distance, self.octave);
             (self.index, self.distance, self.octave) = (index, distance, octave);
@@ -94,13 +94,13 @@ impl Best {
     }
 
     /// Whether the nearest is within `limit` and nearer than `ratio` times the second-nearest.
-    pub fn is_distinct(&self, limit: u32, ratio: f32) -> bool {
+    pub(crate) fn is_distinct(&self, limit: u32, ratio: f32) -> bool {
         self.distance <= limit
             && (self.second_distance == u32::MAX || (self.distance as f32) < ratio * self.second_distance as f32)
     }
 
     /// As [`Best::is_distinct`], where a rival at another octave does not count.
-    pub fn is_distinct_in_octave(&self, limit: u32, ratio: f32) -> bool {
+    pub(crate) fn is_distinct_in_octave(&self, limit: u32, ratio: f32) -> bool {
         self.distance <= limit
             && (self.octave != self.second_octave
                 || self.second_distance == u32::MAX
@@ -109,7 +109,7 @@ impl Best {
 }
 
 /// Matches the points of `last` around their projection into `current`. Returns the number of matches.
-pub fn search_last_frame(
+pub(crate) fn search_last_frame(
     context: &Context,
     last: &TrackedFrame,
     current: &mut TrackedFrame,
@@ -166,7 +166,7 @@ fn match_last_frame<S: Simd>(
 }
 
 /// Matches the landmarks of a keyframe by descriptor alone. Returns the number of matches.
-pub fn search_keyframe(
+pub(crate) fn search_keyframe(
     config: &TrackingConfig,
     keyframe: &KeyFrame,
     map: &Map,
@@ -193,7 +193,7 @@ pub fn search_keyframe(
 
 /// Matches features of the finest level between the first frame and the current one, each around where it was seen last, which is
 /// brought up to date. Returns pairs of feature indices (in first, in current).
-pub fn search_first_frame(
+pub(crate) fn search_first_frame(
     config: &Config,
     first: &TrackedFrame,
     current: &TrackedFrame,
@@ -250,7 +250,7 @@ fn match_first_frame<S: Simd>(
 }
 
 /// Matches landmarks of the local map that the frame does not see yet. `visible` is refilled with those that lie in view.
-pub fn search_local_map(
+pub(crate) fn search_local_map(
     context: &Context,
     map: &Map,
     landmarks: &[LandmarkId],

@@ -10,7 +10,7 @@ use crate::optimize::pose_only::{PoseObservation, optimize_pose, pose_covariance
 
 /// A point that a feature is matched to.
 #[derive(Clone, Copy, Debug)]
-pub struct Match {
+pub(crate) struct Match {
     /// The landmark; `None` for a point borrowed from the last frame's depth.
     pub landmark: Option<LandmarkId>,
     /// Where it is in the world, m.
@@ -21,14 +21,14 @@ pub struct Match {
 
 impl Match {
     /// Of a landmark.
-    pub fn of(id: LandmarkId, landmark: &Landmark) -> Self {
+    pub(crate) fn of(id: LandmarkId, landmark: &Landmark) -> Self {
         Self { landmark: Some(id), point_world: landmark.position, trust: landmark.trust() }
     }
 }
 
 /// A frame with its pose and matches. Buffers are reused from frame to frame.
 #[derive(Clone, Debug, Default)]
-pub struct TrackedFrame {
+pub(crate) struct TrackedFrame {
     /// Time of the frame, ns.
     pub timestamp_ns: i64,
     /// What was seen.
@@ -46,30 +46,30 @@ pub struct TrackedFrame {
 
 impl TrackedFrame {
     /// Begins another frame; its features and matches are set afterwards.
-    pub fn begin(&mut self, timestamp_ns: i64) {
+    pub(crate) fn begin(&mut self, timestamp_ns: i64) {
         self.timestamp_ns = timestamp_ns;
         self.observations.clear();
     }
 
     /// Returns the covariance of the pose (see [`pose_covariance`]) that the inliers of its last refinement give.
-    pub fn covariance(&self, sensor: &SensorModel) -> Option<Matrix6<f64>> {
+    pub(crate) fn covariance(&self, sensor: &SensorModel) -> Option<Matrix6<f64>> {
         pose_covariance(&sensor.pinhole, &self.t_cam_world, &self.observations)
     }
 
     /// Forgets all matches.
-    pub fn clear_matches(&mut self) {
+    pub(crate) fn clear_matches(&mut self) {
         self.matches.clear();
         self.matches.resize(self.features.len(), None);
     }
 
     /// Features that may be matched: trusted and not matched yet.
     #[inline]
-    pub fn is_open(&self, feature: usize) -> bool {
+    pub(crate) fn is_open(&self, feature: usize) -> bool {
         self.matches[feature].is_none() && self.features.features[feature].trust > 0.0
     }
 
     /// Forgets the matches of features that are not trusted any more.
-    pub fn drop_distrusted(&mut self) {
+    pub(crate) fn drop_distrusted(&mut self) {
         for (matched, feature) in self.matches.iter_mut().zip(&self.features.features) {
             if feature.trust <= 0.0 {
                 *matched = None;
@@ -78,7 +78,7 @@ impl TrackedFrame {
     }
 
     /// Distrusts the features that boxes speak against and that are no landmarks either.
-    pub fn settle_doubts(&mut self) {
+    pub(crate) fn settle_doubts(&mut self) {
         for (matched, feature) in self.matches.iter().zip(&mut self.features.features) {
             if feature.trust < 1.0 && matched.is_none() {
                 feature.trust = 0.0;
@@ -87,13 +87,13 @@ impl TrackedFrame {
     }
 
     /// Number of matched features.
-    pub fn matched(&self) -> usize {
+    pub(crate) fn matched(&self) -> usize {
         self.matches.iter().flatten().count()
     }
 
     /// Refines the pose from all matches and drops those that do not fit. Returns the number of inliers that are landmarks of the
     /// map with more than a single matched's worth of evidence.
-    pub fn refine_pose(&mut self, context: &Context) -> usize {
+    pub(crate) fn refine_pose(&mut self, context: &Context) -> usize {
         let (sensor, config) = (&context.sensor, &context.config.pose);
         self.observations.clear();
         self.observed.clear();
@@ -123,7 +123,7 @@ impl TrackedFrame {
 
     /// Lends unmatched features with depth to the next frame as points: all close ones, at least the `at_least` closest. They never
     /// enter the map.
-    pub fn add_odometry_points(&mut self, sensor: &SensorModel, at_least: usize) {
+    pub(crate) fn add_odometry_points(&mut self, sensor: &SensorModel, at_least: usize) {
         let t_world_cam = self.t_cam_world.inverse();
         self.nearest.clear();
         for (i, f) in self.features.features.iter().enumerate() {
@@ -143,14 +143,14 @@ impl TrackedFrame {
     }
 
     /// Its pose, `t_cam_world`, where the map is now.
-    pub fn pose_in(&self, map: &Map) -> Pose {
+    pub(crate) fn pose_in(&self, map: &Map) -> Pose {
         let tied =
             self.reference.and_then(|(reference, t_cam_reference)| map.absolute_pose(reference, &t_cam_reference));
         tied.unwrap_or(self.t_cam_world)
     }
 
     /// Brings pose and matched points up to date after the map moved; matches to landmarks that are gone are dropped.
-    pub fn follow_map(&mut self, map: &Map) {
+    pub(crate) fn follow_map(&mut self, map: &Map) {
         self.t_cam_world = self.pose_in(map);
         for matched in &mut self.matches {
             if let Some(Match { landmark: Some(id), .. }) = *matched {
@@ -160,7 +160,7 @@ impl TrackedFrame {
     }
 
     /// Ties the frame to a keyframe, so that it moves along when the map is corrected.
-    pub fn attach_to(&mut self, reference: KeyFrameId, map: &Map) {
+    pub(crate) fn attach_to(&mut self, reference: KeyFrameId, map: &Map) {
         self.reference =
             map.relative_pose(reference, &self.t_cam_world).map(|t_cam_reference| (reference, t_cam_reference));
     }

@@ -18,7 +18,7 @@ use crate::tracking::search::search_first_frame;
 
 /// A frame that is to become a keyframe, and its picture.
 #[derive(Clone, Debug)]
-pub struct StartFrame {
+pub(crate) struct StartFrame {
     /// The frame; its pose is set.
     pub frame: TrackedFrame,
     /// Its picture.
@@ -26,11 +26,11 @@ pub struct StartFrame {
 }
 
 /// A landmark: its feature in the first frame, that in the second, and its place in the world.
-pub type StartPoint = (usize, usize, Point3<f64>);
+pub(super) type StartPoint = (usize, usize, Point3<f64>);
 
 /// Two frames that make a map.
 #[derive(Clone, Debug)]
-pub struct TwoViewMap {
+pub(crate) struct TwoViewMap {
     /// The first, whose camera is the world.
     pub first: StartFrame,
     /// The second.
@@ -41,7 +41,7 @@ pub struct TwoViewMap {
 
 /// Waits for two frames that make a map.
 #[derive(Clone, Debug, Default)]
-pub struct TwoViewInitialiser {
+pub(crate) struct TwoViewInitialiser {
     first: Option<StartFrame>,
     /// Where each feature of the first frame was seen last, undistorted px.
     last_seen: Vec<[f32; 2]>,
@@ -50,12 +50,17 @@ pub struct TwoViewInitialiser {
 
 impl TwoViewInitialiser {
     /// Forgets the first frame.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.first = None;
     }
 
     /// Looks whether `current` and the first frame make a map. A frame that shows too little of what the first showed becomes the first.
-    pub fn add(&mut self, context: &Context, current: &TrackedFrame, color: &Arc<RgbImage>) -> Option<TwoViewMap> {
+    pub(crate) fn add(
+        &mut self,
+        context: &Context,
+        current: &TrackedFrame,
+        color: &Arc<RgbImage>,
+    ) -> Option<TwoViewMap> {
         let Context { sensor, config } = context;
         let c = &config.monocular;
         let Some(first) = &self.first else {

@@ -14,7 +14,7 @@ use crate::image::DepthImage;
 const AROUND_PX: f64 = 8.0;
 
 /// Whether a frame sees through a point of the world, all around.
-pub fn is_free_space(
+pub(super) fn is_free_space(
     config: &FullConfig,
     sensor: &SensorModel,
     depth: &DepthImage,

@@ -31,7 +31,7 @@ struct Earlier {
 
 /// Trusts what moves like its neighbours. Buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub struct DmsSlam {
+pub(crate) struct DmsSlam {
     window: VecDeque<Earlier>,
     /// The feature of each match, where it was and where it is.
     matches: Vec<(u32, [f32; 2], [f32; 2])>,

@@ -34,7 +34,7 @@ const REACH_PX: f32 = 15.0;
 
 /// Drops people while something on them moves. Buffers are reused.
 #[derive(Clone, Debug)]
-pub struct DsSlam {
+pub(crate) struct DsSlam {
     flow: Flow,
     /// Where the last frame has features, px.
     corners: Vec<[f32; 2]>,
@@ -52,7 +52,7 @@ pub struct DsSlam {
 
 impl DsSlam {
     /// Draws start from `seed`.
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self {
             flow: Flow::default(),
             corners: Vec::new(),

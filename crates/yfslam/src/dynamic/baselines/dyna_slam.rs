@@ -38,7 +38,7 @@ const REGION_STEP_M: f32 = 0.2;
 
 /// Drops people, and what stands where keyframes saw farther. Buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub struct DynaSlam {
+pub(crate) struct DynaSlam {
     tracks: Tracks,
     groups: DepthClusters,
     segmenter: Segmenter,
@@ -49,7 +49,7 @@ pub struct DynaSlam {
 
 impl DynaSlam {
     /// Draws start from `seed`.
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self { groups: DepthClusters::new(seed), ..Self::default() }
     }
 

@@ -4,6 +4,6 @@ mod dms_slam;
 mod ds_slam;
 mod dyna_slam;
 
-pub use dms_slam::DmsSlam;
-pub use ds_slam::DsSlam;
-pub use dyna_slam::DynaSlam;
+pub(crate) use dms_slam::DmsSlam;
+pub(crate) use ds_slam::DsSlam;
+pub(crate) use dyna_slam::DynaSlam;

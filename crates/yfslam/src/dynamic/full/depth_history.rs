@@ -15,7 +15,7 @@ use crate::geometry::Pose;
 use crate::map::KeyframeRelativePose;
 
 /// Side of a cell, px.
-pub const VIEW_CELL_PX: usize = 8;
+pub(super) const VIEW_CELL_PX: usize = 8;
 
 /// Depth of an earlier frame, without what moved in it.
 #[derive(Clone, Debug)]
@@ -27,7 +27,7 @@ struct View {
 
 /// Earlier views, and the comparison with them. Buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub struct DepthHistory {
+pub(super) struct DepthHistory {
     columns: usize,
     rows: usize,
     /// Direction of each cell, x and y at depth 1, lens distortion removed.
@@ -46,13 +46,13 @@ pub struct DepthHistory {
 
 impl DepthHistory {
     /// Whether a frame at this time should be kept.
-    pub fn is_due(&self, config: &FullConfig, timestamp_ns: i64) -> bool {
+    pub(super) fn is_due(&self, config: &FullConfig, timestamp_ns: i64) -> bool {
         let since_s = |view: &View| timestamp_ns.saturating_sub(view.timestamp_ns) as f64 * 1e-9;
         self.ring.back().is_none_or(|view| since_s(view) >= config.view_spacing_s)
     }
 
     /// Keeps a frame: depths of its cells, 0 where it is unknown or moves.
-    pub fn keep(
+    pub(super) fn keep(
         &mut self,
         config: &FullConfig,
         timestamp_ns: i64,
@@ -67,12 +67,12 @@ impl DepthHistory {
     }
 
     /// Forgets all.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.spare.extend(self.ring.drain(..).map(|view| view.depth_m));
     }
 
     /// Compares the depths of the frame's cells with all views that tell something about them.
-    pub fn compare_all(&mut self, config: &FullConfig, first: &FirstPose<'_>, depth_m: &[f32]) {
+    pub(super) fn compare_all(&mut self, config: &FullConfig, first: &FirstPose<'_>, depth_m: &[f32]) {
         let FirstPose { sensor, map, t_cam_world } = *first;
         self.prepare(config, sensor);
         self.nearer.clear();
@@ -97,7 +97,7 @@ impl DepthHistory {
     }
 
     /// Whether a cell shows what stood there in earlier views; `None` if they do not tell.
-    pub fn is_as_before(&self, cell: usize) -> Option<bool> {
+    pub(super) fn is_as_before(&self, cell: usize) -> Option<bool> {
         let (same, nearer) = (self.same[cell], self.nearer[cell]);
         (same.max(nearer) >= 2).then_some(same > nearer)
     }
@@ -182,7 +182,7 @@ impl DepthHistory {
 
     /// Calls `moving` with each cell (column, row) of what stands nearer than earlier views allow; `depth_m` are those compared, 0 where
     /// it is known already that something moves.
-    pub fn clusters(&mut self, config: &FullConfig, depth_m: &[f32], mut moving: impl FnMut(usize, usize)) {
+    pub(super) fn clusters(&mut self, config: &FullConfig, depth_m: &[f32], mut moving: impl FnMut(usize, usize)) {
         let columns = self.columns;
         for seed in 0..depth_m.len() {
             if !self.is_new(seed, depth_m) {

@@ -19,7 +19,7 @@ use crate::map::KeyframeRelativePose;
 
 /// Segmenter bodies and what has moved. Buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub struct Full {
+pub(super) struct Full {
     tracks: Tracks,
     groups: DepthClusters,
     segmenter: Segmenter,
@@ -41,7 +41,7 @@ pub struct Full {
 
 impl Full {
     /// Draws start from `seed`.
-    pub fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         Self { groups: DepthClusters::new(seed), ..Self::default() }
     }
 

@@ -18,7 +18,7 @@ const SAMPLE_STEP: usize = 4;
 
 /// Finds the depth group of the body in each box. Buffers are reused.
 #[derive(Clone, Debug)]
-pub struct DepthClusters {
+pub(crate) struct DepthClusters {
     rng: Pcg32,
     feature_depths: Vec<f32>,
     pixel_depths: Vec<f32>,
@@ -33,7 +33,7 @@ impl Default for DepthClusters {
 
 impl DepthClusters {
     /// Draws start from `seed`.
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self {
             rng: Pcg32::new(seed, 0x5eed),
             feature_depths: Vec::new(),
@@ -43,7 +43,7 @@ impl DepthClusters {
     }
 
     /// The depth of the body in each box, m; `None` where nothing was measured.
-    pub fn depths_of(
+    pub(crate) fn depths_of(
         &mut self,
         config: &DynamicConfig,
         boxes: &[Detection],
@@ -60,7 +60,7 @@ impl DepthClusters {
     }
 
     /// Depth of the body of a track in its box, m.
-    pub fn body_of(
+    pub(crate) fn body_of(
         &mut self,
         config: &DynamicConfig,
         track: &Track,
@@ -73,7 +73,12 @@ impl DepthClusters {
     }
 
     /// Depth of the body of a track in what other bodies leave free of its box, m, and how many of its cells that is.
-    pub fn body_in(&mut self, config: &DynamicConfig, track: &Track, bodies: &InstanceMask) -> Option<(f32, usize)> {
+    pub(crate) fn body_in(
+        &mut self,
+        config: &DynamicConfig,
+        track: &Track,
+        bodies: &InstanceMask,
+    ) -> Option<(f32, usize)> {
         self.feature_depths.clear();
         self.pixel_depths.clear();
         bodies.free_depths(&track.bbox, &mut self.pixel_depths);
@@ -83,7 +88,12 @@ impl DepthClusters {
     }
 
     /// Depth of the body in a box, m, in what others leave free of it.
-    pub fn thing_in(&mut self, config: &DynamicConfig, bbox: &BoundingBox, bodies: &InstanceMask) -> Option<f32> {
+    pub(crate) fn thing_in(
+        &mut self,
+        config: &DynamicConfig,
+        bbox: &BoundingBox,
+        bodies: &InstanceMask,
+    ) -> Option<f32> {
         self.feature_depths.clear();
         self.pixel_depths.clear();
         bodies.free_depths(bbox, &mut self.pixel_depths);

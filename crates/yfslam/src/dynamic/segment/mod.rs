@@ -2,6 +2,6 @@
 //!
 //! In: bounding boxes with depth, masks of a segmentation network. Out: a mask on a grid of cells, with the instance of each cell.
 
-pub mod depth_clusters;
-pub mod mask;
-pub mod segmenter;
+pub(crate) mod depth_clusters;
+pub(crate) mod mask;
+pub(crate) mod segmenter;

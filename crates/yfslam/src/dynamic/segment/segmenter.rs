@@ -10,7 +10,7 @@ use crate::features::FrameFeatures;
 
 /// Segmenter the bodies of a frame. Buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub struct Segmenter {
+pub(crate) struct Segmenter {
     /// What was outlined.
     pub bodies: InstanceMask,
     /// Tracks that have no outline yet.
@@ -21,7 +21,7 @@ pub struct Segmenter {
 
 impl Segmenter {
     /// Begins a frame with what its mask says.
-    pub fn begin(&mut self, input: &FilterInput<'_>) {
+    pub(crate) fn begin(&mut self, input: &FilterInput<'_>) {
         self.bodies.begin(input.depth);
         if let Some(mask) = input.mask {
             self.bodies.mark_mask(mask);
@@ -30,7 +30,13 @@ impl Segmenter {
 
     /// Segmenter the bodies of all tracks of at least this score, the nearest first: who is hidden behind somebody is sought in what that
     /// one leaves free.
-    pub fn outline(&mut self, config: &DynamicConfig, groups: &mut DepthClusters, tracks: &mut Tracks, min_score: f32) {
+    pub(crate) fn outline(
+        &mut self,
+        config: &DynamicConfig,
+        groups: &mut DepthClusters,
+        tracks: &mut Tracks,
+        min_score: f32,
+    ) {
         self.waiting.clear();
         self.waiting
             .extend((0..tracks.list.len()).filter(|&t| tracks.list[t].is_body() && tracks.list[t].score >= min_score));
@@ -119,7 +125,7 @@ impl Segmenter {
     }
 
     /// Distrusts what lies on a body or within `edge_px`, at the finest level, of one; the rest is trusted. Returns how many are.
-    pub fn distrust(&self, edge_px: f32, sensor: &SensorModel, features: &mut FrameFeatures) -> usize {
+    pub(crate) fn distrust(&self, edge_px: f32, sensor: &SensorModel, features: &mut FrameFeatures) -> usize {
         let mut trusted = 0;
         for f in &mut features.features {
             f.trust = if self.bodies.covers(f.raw, edge_px * sensor.scale(f.octave)) { 0.0 } else { 1.0 };

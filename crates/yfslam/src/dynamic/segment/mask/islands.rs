@@ -12,7 +12,7 @@ const ATTACHED: u8 = NO_TRACK - 1;
 impl InstanceMask {
     /// Marks what lies in the box of a track at depths that its body can reach and hangs together with nothing else: limbs whose way to the
     /// trunk is hidden, by the trunk itself or by somebody in front.
-    pub fn add_islands(&mut self, config: &DynamicConfig, track: usize, bbox: &BoundingBox, center_m: f32) {
+    pub(crate) fn add_islands(&mut self, config: &DynamicConfig, track: usize, bbox: &BoundingBox, center_m: f32) {
         let owner = owner(track);
         let (inner, outer) = (self.cells(bbox, 0.0), self.cells(bbox, config.margin));
         let reach_m = config.group_half_width_m + config.reach_m;

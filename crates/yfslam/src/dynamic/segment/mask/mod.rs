@@ -10,7 +10,7 @@ use crate::detect::BoundingBox;
 use crate::image::{DepthImage, Image};
 
 /// Side of a cell, px.
-pub const CELL_PX: usize = 4;
+pub(crate) const CELL_PX: usize = 4;
 
 /// Owner of cells that move without being a track's body: they were in a mask, or have moved since earlier views.
 const NO_TRACK: u8 = u8::MAX;
@@ -22,7 +22,7 @@ fn owner(track: usize) -> u8 {
 
 /// Which cells of the image show something that moves. Buffers are reused.
 #[derive(Clone, Debug, Default)]
-pub struct InstanceMask {
+pub(crate) struct InstanceMask {
     columns: usize,
     rows: usize,
     /// Depth in the middle of each cell, m; 0 where it is unknown.
@@ -35,7 +35,7 @@ pub struct InstanceMask {
 
 /// Place and size of a body in the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Extent {
+pub(crate) struct Extent {
     /// Its middle, px.
     pub middle: [f32; 2],
     /// Cells that it fills.
@@ -54,7 +54,7 @@ struct Reached {
 
 impl InstanceMask {
     /// Begins a frame: samples depth, and nothing moves.
-    pub fn begin(&mut self, depth: &DepthImage) {
+    pub(crate) fn begin(&mut self, depth: &DepthImage) {
         self.columns = depth.raw.width() / CELL_PX;
         self.rows = depth.raw.height() / CELL_PX;
         self.depth_m.clear();
@@ -68,14 +68,14 @@ impl InstanceMask {
     }
 
     /// Becomes a copy of another, in the memory it has.
-    pub fn copy(&mut self, other: &Self) {
+    pub(crate) fn copy(&mut self, other: &Self) {
         (self.columns, self.rows) = (other.columns, other.rows);
         self.depth_m.clone_from(&other.depth_m);
         self.owner.clone_from(&other.owner);
     }
 
     /// Appends the depths in a box that belong to no body yet, m.
-    pub fn free_depths(&self, bbox: &BoundingBox, out: &mut Vec<f32>) {
+    pub(crate) fn free_depths(&self, bbox: &BoundingBox, out: &mut Vec<f32>) {
         let [left, top, right, bottom] = self.cells(bbox, 0.0);
         for row in top..bottom {
             let line = row * self.columns..(row + 1) * self.columns;
@@ -87,7 +87,7 @@ impl InstanceMask {
     /// Marks the body of a track, whose middle is `center_m` away: the cells of the box at that depth, and those in the box grown by `config.margin`
     /// to which the surface leads on without a step, over gaps without depth too. Of the gaps, those in the box are marked.
     /// Returns what was marked.
-    pub fn grow(&mut self, config: &DynamicConfig, track: usize, bbox: &BoundingBox, center_m: f32) -> Extent {
+    pub(crate) fn grow(&mut self, config: &DynamicConfig, track: usize, bbox: &BoundingBox, center_m: f32) -> Extent {
         let owner = owner(track);
         let (inner, outer) = (self.cells(bbox, 0.0), self.cells(bbox, config.margin));
         let [near, far] = [center_m - config.group_half_width_m, center_m + config.group_half_width_m];
@@ -153,7 +153,7 @@ impl InstanceMask {
 
     /// How far away what a mask marked in a box is, m, infinite where that was not measured; `None` if it fills less than
     /// `config.body_min_share` of the box.
-    pub fn masked_depth(&mut self, config: &DynamicConfig, bbox: &BoundingBox) -> Option<f32> {
+    pub(crate) fn masked_depth(&mut self, config: &DynamicConfig, bbox: &BoundingBox) -> Option<f32> {
         let cells = self.collect_masked(bbox);
         if self.body.is_empty() || (self.body.len() as f32) < config.body_min_share * cells as f32 {
             return None;
@@ -168,7 +168,7 @@ impl InstanceMask {
     }
 
     /// Gives what a mask marked in a box to a track. Returns what that is.
-    pub fn claim(&mut self, track: usize, bbox: &BoundingBox) -> Extent {
+    pub(crate) fn claim(&mut self, track: usize, bbox: &BoundingBox) -> Extent {
         self.collect_masked(bbox);
         for reached in &self.body {
             self.owner[reached.cell as usize] = owner(track);
@@ -191,12 +191,12 @@ impl InstanceMask {
     }
 
     /// Marks the cells whose middle a mask of movable objects covers.
-    pub fn mark_mask(&mut self, mask: &Image<u8>) {
+    pub(crate) fn mark_mask(&mut self, mask: &Image<u8>) {
         self.mark_where(|x, y| mask.get(x, y).is_some_and(|number| *number > 0));
     }
 
     /// Marks the cells whose middle, px, is said to move.
-    pub fn mark_where(&mut self, moves: impl Fn(usize, usize) -> bool) {
+    pub(crate) fn mark_where(&mut self, moves: impl Fn(usize, usize) -> bool) {
         for (row, line) in self.owner.chunks_mut(self.columns.max(1)).enumerate() {
             for (column, owner) in line.iter_mut().enumerate() {
                 if moves(column * CELL_PX + CELL_PX / 2, row * CELL_PX + CELL_PX / 2) {
@@ -207,7 +207,7 @@ impl InstanceMask {
     }
 
     /// Share of a box that shows something nearer than `depth_m`.
-    pub fn share_nearer(&self, bbox: &BoundingBox, depth_m: f32) -> f32 {
+    pub(crate) fn share_nearer(&self, bbox: &BoundingBox, depth_m: f32) -> f32 {
         let [left, top, right, bottom] = self.cells(bbox, 0.0);
         let row = |row: usize| self.depth_m[row * self.columns..].iter().take(right).skip(left);
         let nearer = (top..bottom).flat_map(row).filter(|z| **z > 0.0 && **z < depth_m).count();
@@ -215,13 +215,13 @@ impl InstanceMask {
     }
 
     /// Whether a box shows something that moves.
-    pub fn holds_body(&self, bbox: &BoundingBox) -> bool {
+    pub(crate) fn holds_body(&self, bbox: &BoundingBox) -> bool {
         let [left, top, right, bottom] = self.cells(bbox, 0.0);
         (top..bottom).any(|row| self.owner[row * self.columns..].iter().take(right).skip(left).any(|owner| *owner != 0))
     }
 
     /// Marks the whole box of a track.
-    pub fn fill(&mut self, track: usize, bbox: &BoundingBox) {
+    pub(crate) fn fill(&mut self, track: usize, bbox: &BoundingBox) {
         let [left, top, right, bottom] = self.cells(bbox, 0.0);
         for row in top..bottom {
             self.owner[row * self.columns + left..row * self.columns + right.max(left)].fill(owner(track));
@@ -229,13 +229,13 @@ impl InstanceMask {
     }
 
     /// Every second cell of every second row, a coarse cell: whether something moves there, and its depth, m, 0 where it is unknown.
-    pub fn coarse(&self) -> impl Iterator<Item = (bool, f32)> + '_ {
+    pub(crate) fn coarse(&self) -> impl Iterator<Item = (bool, f32)> + '_ {
         let count = (self.rows / 2) * (self.columns / 2);
         (0..count).map(|coarse| self.finest(coarse)).map(|cell| (self.owner[cell] != 0, self.depth_m[cell]))
     }
 
     /// The track whose body a coarse cell belongs to.
-    pub fn track_at(&self, coarse: usize) -> Option<usize> {
+    pub(crate) fn track_at(&self, coarse: usize) -> Option<usize> {
         match self.owner[self.finest(coarse)] {
             0 | NO_TRACK => None,
             owner => Some(usize::from(owner) - 1),
@@ -243,7 +243,7 @@ impl InstanceMask {
     }
 
     /// Takes back what was marked in a coarse cell.
-    pub fn release_coarse(&mut self, coarse: usize) {
+    pub(crate) fn release_coarse(&mut self, coarse: usize) {
         let cell = self.finest(coarse);
         for line in [cell, cell + self.columns] {
             self.owner[line..line + 2].fill(0);
@@ -258,7 +258,7 @@ impl InstanceMask {
 
     /// How much nearer than `expected_m` the farthest thing in front of that depth is, m, among the cells within `radius_px` of a position,
     /// and the variance of all depths there, m²; `None` if nothing is nearer.
-    pub fn step_behind(&self, [x, y]: [f32; 2], radius_px: f32, expected_m: f32) -> Option<(f32, f32)> {
+    pub(crate) fn step_behind(&self, [x, y]: [f32; 2], radius_px: f32, expected_m: f32) -> Option<(f32, f32)> {
         let near = |v: f32, limit: usize| {
             let cell = |v: f32| (v.max(0.0) as usize / CELL_PX).min(limit.saturating_sub(1));
             cell(v - radius_px)..=cell(v + radius_px)
@@ -279,7 +279,7 @@ impl InstanceMask {
     }
 
     /// Marks the region around a position whose depths differ from its mean by at most `step_m`. Returns whether anything is new.
-    pub fn grow_from(&mut self, [x, y]: [f32; 2], step_m: f32) -> bool {
+    pub(crate) fn grow_from(&mut self, [x, y]: [f32; 2], step_m: f32) -> bool {
         let (column, row) = (x.max(0.0) as usize / CELL_PX, y.max(0.0) as usize / CELL_PX);
         if column >= self.columns || row >= self.rows {
             return false;
@@ -314,13 +314,13 @@ impl InstanceMask {
     }
 
     /// Takes back what was marked for a track.
-    pub fn release(&mut self, track: usize) {
+    pub(crate) fn release(&mut self, track: usize) {
         let owner = owner(track);
         self.owner.iter_mut().filter(|o| **o == owner).for_each(|o| *o = 0);
     }
 
     /// Marks a cell of twice the side, and what adjoins it.
-    pub fn mark_coarse(&mut self, column: usize, row: usize) {
+    pub(crate) fn mark_coarse(&mut self, column: usize, row: usize) {
         for r in (2 * row).saturating_sub(1)..(2 * row + 3).min(self.rows) {
             let line = r * self.columns;
             let cells = line + (2 * column).saturating_sub(1)..line + (2 * column + 3).min(self.columns);
@@ -329,7 +329,7 @@ impl InstanceMask {
     }
 
     /// Whether a position of the raw image, px, lies on a body or within `edge_px` of one.
-    pub fn covers(&self, [x, y]: [f32; 2], edge_px: f32) -> bool {
+    pub(crate) fn covers(&self, [x, y]: [f32; 2], edge_px: f32) -> bool {
         let near = |d: f32, r: f32| (((d - r).max(0.0) as usize) / CELL_PX, ((d + r).max(0.0) as usize) / CELL_PX);
         let ((left, right), (top, bottom)) = (near(x, edge_px), near(y, edge_px));
         (top..=bottom.min(self.rows.saturating_sub(1))).any(|row| {
@@ -340,7 +340,7 @@ impl InstanceMask {
     }
 
     /// The track whose body a position of the raw image, px, lies on.
-    pub fn body_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
+    pub(crate) fn body_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
         let [column, row] = [x, y].map(|v| (v.max(0.0) as usize) / CELL_PX);
         let owner = *self.owner.get(row * self.columns + column).filter(|_| column < self.columns)?;
         (owner != 0 && owner != NO_TRACK).then(|| usize::from(owner) - 1)
