@@ -37,93 +37,26 @@ impl Default for DetectorConfig {
     }
 }
 
-/// Anchors of the official model, px of its 352 × 352 input: k-means centres of the boxes of COCO.
-pub(crate) const COCO_ANCHORS: [[[f32; 2]; 3]; 2] =
-    [[[12.64, 19.39], [37.88, 51.48], [55.71, 138.31]], [[126.91, 78.23], [131.57, 214.55], [279.92, 258.87]]];
-
-/// The 80 classes of COCO (Lin et al., ECCV 2014) in the order of their ids.
-pub(crate) const COCO_NAMES: [&str; 80] = [
-    "person",
-    "bicycle",
-    "car",
-    "motorcycle",
-    "airplane",
-    "bus",
-    "train",
-    "truck",
-    "boat",
-    "traffic light",
-    "fire hydrant",
-    "stop sign",
-    "parking meter",
-    "bench",
-    "bird",
-    "cat",
-    "dog",
-    "horse",
-    "sheep",
-    "cow",
-    "elephant",
-    "bear",
-    "zebra",
-    "giraffe",
-    "backpack",
-    "umbrella",
-    "handbag",
-    "tie",
-    "suitcase",
-    "frisbee",
-    "skis",
-    "snowboard",
-    "sports ball",
-    "kite",
-    "baseball bat",
-    "baseball glove",
-    "skateboard",
-    "surfboard",
-    "tennis racket",
-    "bottle",
-    "wine glass",
-    "cup",
-    "fork",
-    "knife",
-    "spoon",
-    "bowl",
-    "banana",
-    "apple",
-    "sandwich",
-    "orange",
-    "broccoli",
-    "carrot",
-    "hot dog",
-    "pizza",
-    "donut",
-    "cake",
-    "chair",
-    "couch",
-    "potted plant",
-    "bed",
-    "dining table",
-    "toilet",
-    "tv",
-    "laptop",
-    "mouse",
-    "remote",
-    "keyboard",
-    "cell phone",
-    "microwave",
-    "oven",
-    "toaster",
-    "sink",
-    "refrigerator",
-    "book",
-    "clock",
-    "vase",
-    "scissors",
-    "teddy bear",
-    "hair drier",
-    "toothbrush",
-];
+impl DetectorConfig {
+    /// Refuses values with which no network can be run.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let Self { score_threshold, iou_threshold, fuse_iou, anchors, .. } = self;
+        if !(*score_threshold > 0.0 && *score_threshold < 1.0) {
+            return Err(format!("score_threshold = {score_threshold} must lie between 0 and 1"));
+        }
+        if !(*iou_threshold > 0.0 && *iou_threshold <= 1.0) {
+            return Err(format!("iou_threshold = {iou_threshold} must lie between 0 and 1"));
+        }
+        if !(*fuse_iou > 0.0 && *fuse_iou <= 1.0) {
+            return Err(format!("fuse_iou = {fuse_iou} must lie between 0 and 1"));
+        }
+        let wrong = |anchor: &&[f32; 2]| anchor.iter().any(|side| !(side.is_finite() && *side > 0.0));
+        match anchors.iter().flatten().find(wrong) {
+            Some(anchor) => Err(format!("anchors: {anchor:?} must be a width and a height above 0 px")),
+            None => Ok(()),
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,8 @@
 //! The network that comes with this crate; `models/README.md` says what it can do and where it comes from.
 
-use crate::{DetectorConfig, ModelError, YoloFastestV2};
+use crate::config::DetectorConfig;
+use crate::error::ModelError;
+use crate::yolo::YoloFastestV2;
 
 /// An ONNX file whose network finds people. MIT OR Apache-2.0, as this crate.
 pub const EMBEDDED_MODEL: &[u8] = include_bytes!("../models/person.onnx");

@@ -24,25 +24,20 @@
 #[cfg(feature = "rten")]
 mod any_yolo;
 mod config;
-mod decode;
 mod embedded;
+mod engine;
 mod error;
-mod graph;
-mod kernels;
 mod load;
-mod memory;
-mod onnx;
-mod places;
-mod plan;
-mod preprocess;
+mod network;
 mod yolo;
 
 #[cfg(feature = "rten")]
 pub use any_yolo::AnyYolo;
 pub use config::DetectorConfig;
 pub use embedded::EMBEDDED_MODEL;
+pub use engine::kernels::available_levels;
 pub use error::ModelError;
 pub use fearless_simd::Level;
-pub use kernels::available_levels;
-pub use load::{Network, load};
+pub use load::load;
+pub use network::Network;
 pub use yolo::{RawOutput, YoloFastestV2};

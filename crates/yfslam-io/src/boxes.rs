@@ -8,9 +8,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use yfslam::{BoundingBox, Detection};
 
+use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::text::read_text;
-use crate::write::write_atomically;
 
 /// Name of the file in a sequence folder.
 pub const BOXES_FILE: &str = "boxes.json";

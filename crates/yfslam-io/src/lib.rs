@@ -29,7 +29,7 @@
 //! }
 //! ```
 
-mod ascending;
+mod atomic_file;
 pub mod boxes;
 pub mod camera;
 pub mod decode;
@@ -41,9 +41,11 @@ pub mod sequence;
 pub mod stream;
 mod text;
 pub mod time;
+mod timestamp_order;
 pub mod trajectory;
 pub mod write;
 
+pub use atomic_file::write_atomically;
 pub use boxes::BoxList;
 pub use camera::{CameraSource, detect_camera, load_camera};
 pub use depth::{DepthStatistics, check_recording};
@@ -52,4 +54,4 @@ pub use faults::{Delivery, Fault, FaultInjector, FaultKind};
 pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};
 pub use trajectory::{StampedPose, TrajectoryFile, write_trajectory};
-pub use write::{RecordingWriter, write_atomically};
+pub use write::RecordingWriter;

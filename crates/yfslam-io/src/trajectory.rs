@@ -5,11 +5,11 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-use crate::ascending::keep_ascending;
+use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::text::{content_lines, read_text};
 use crate::time::{TimeMirror, format_stamp, parse_stamp_ns};
-use crate::write::write_atomically;
+use crate::timestamp_order::keep_ascending;
 
 /// Largest deviation of a quaternion's length from 1. Files with two decimals stay below; columns in another order rarely do.
 const MAX_NORM_ERROR: f64 = 0.05;

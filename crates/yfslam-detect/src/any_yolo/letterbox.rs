@@ -4,7 +4,7 @@ use fearless_simd::Level;
 use yfslam::BoundingBox;
 use yfslam::image::RgbImage;
 
-use crate::preprocess::Stretch;
+use crate::yolo::preprocess::Stretch;
 
 /// What these networks are trained to see beside an image.
 const GREY: f32 = 114.0 / 255.0;

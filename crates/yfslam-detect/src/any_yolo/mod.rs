@@ -14,10 +14,12 @@ use rten_tensor::{NdTensorView, TensorView};
 use yfslam::image::{Image, RgbImage};
 use yfslam::{Detection, Detector, DetectorError};
 
-use crate::decode::suppress;
-use crate::onnx::Model;
-use crate::yolo::{check, class_names, parse_names};
-use crate::{DetectorConfig, ModelError, Network};
+use crate::config::DetectorConfig;
+use crate::engine::onnx::Model;
+use crate::error::ModelError;
+use crate::network::Network;
+use crate::yolo::decode::suppress;
+use crate::yolo::metadata::{class_names, parse_names};
 use layout::Layout;
 use letterbox::Letterbox;
 use masks::Prototypes;
@@ -58,7 +60,7 @@ impl AnyYolo {
     /// If it is no ONNX model, `rten` cannot run it, its input or output is not as expected, or it does not fit `config`.
     pub fn from_bytes(name: &str, bytes: &[u8], config: &DetectorConfig) -> Result<Self, ModelError> {
         let mismatch = |what: String| ModelError::Mismatch { model: name.into(), what };
-        check(config).map_err(mismatch)?;
+        config.check().map_err(mismatch)?;
         if config.integers {
             return Err(mismatch("integers are for YOLO-FastestV2 alone (`integers`); this is another network".into()));
         }

@@ -5,12 +5,13 @@
 
 mod associate;
 pub(crate) mod euroc;
+mod ground_truth;
 mod info;
 pub(crate) mod kitti;
 mod layout;
 pub mod lists;
 mod pairs;
-mod truth;
+mod tum;
 
 use std::path::{Path, PathBuf};
 
@@ -18,10 +19,10 @@ use yfslam::config::DepthSource;
 
 use crate::error::{Error, Result};
 use crate::time::TimeMirror;
+pub use ground_truth::TruthReader;
 pub use info::{CompanionOffset, SequenceInfo};
 pub use layout::{Calibration, Layout};
 use lists::ListedFile;
-pub use truth::TruthReader;
 
 /// How a sequence is read and which part of it is played.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use super::associate::associate;
 use super::lists::{ListedFile, color_is_second, parse_file_list, parse_pair_list};
 use super::{AssociationReport, FrameEntry};
-use crate::ascending::keep_ascending;
 use crate::error::{Error, Result};
 use crate::text::read_text;
 use crate::time::format_stamp;
+use crate::timestamp_order::keep_ascending;
 
 /// Takes the pairs of an `associations.txt`, colour and depth; the paths are still relative to its folder.
 pub fn from_associations(path: &Path) -> Result<(Vec<FrameEntry>, AssociationReport)> {

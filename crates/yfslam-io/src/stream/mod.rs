@@ -4,7 +4,7 @@
 //! [`FrameError`]. Dropping the stream ends the threads.
 
 mod fault;
-mod lane;
+mod prefetch_queue;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use crate::rectify::{Remap, StereoRectification};
 use crate::sequence::{FrameEntry, Sequence};
 use crate::text::read_bytes;
 pub use fault::{FrameError, FrameFault};
-use lane::{Decoded, Lane};
+use prefetch_queue::{Decoded, Lane};
 
 /// Images that wait decoded for the caller unless told otherwise; each thread holds one more in its hands.
 /// A 640×480 frame takes 1.5 MB.

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use yfslam::dense::grid::{GridCell, GroundGrid};
 
+use crate::atomic_file::write_atomically;
 use crate::error::Result;
-use crate::write::write_atomically;
 
 /// Writes `path` (`.pgm`) and the `.yaml` beside it.
 ///

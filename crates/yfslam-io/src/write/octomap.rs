@@ -9,8 +9,8 @@ use std::path::Path;
 
 use yfslam::dense::voxels::{Block, SIDE, Voxel};
 
+use crate::atomic_file::write_atomically;
 use crate::error::Result;
-use crate::write::write_atomically;
 
 /// Levels of the tree below its root; keys have as many bits.
 const DEPTH: u32 = 16;

@@ -3,8 +3,8 @@
 use std::io;
 use std::path::Path;
 
+use crate::atomic_file::write_atomically;
 use crate::error::Result;
-use crate::write::write_atomically;
 
 /// A coloured point.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,8 +6,8 @@ use std::path::Path;
 use png::{BitDepth, ColorType, Compression, Encoder};
 use yfslam::image::{Image, RgbImage};
 
+use crate::atomic_file::write_atomically;
 use crate::error::Result;
-use crate::write::write_atomically;
 
 /// Writes an 8-bit RGB PNG.
 ///

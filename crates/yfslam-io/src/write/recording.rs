@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use yfslam::image::Image;
 use yfslam::{Camera, RgbdFrame};
 
-use super::Temporary;
 use super::png::{encode_color, encode_depth, encode_mask};
+use crate::atomic_file::Temporary;
 use crate::boxes::{BOXES_FILE, BoxList};
 use crate::error::{Error, Result};
 use crate::time::format_stamp;

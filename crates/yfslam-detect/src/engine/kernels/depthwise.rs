@@ -188,7 +188,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kernels::testing::{Arena, assert_close, levels, noise};
+    use crate::engine::kernels::testing::{Arena, assert_close, levels, noise};
 
     proptest! {
         #[test]

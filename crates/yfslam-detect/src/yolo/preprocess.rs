@@ -140,7 +140,7 @@ mod tests {
             height: usize,
             samples: Vec<(usize, f32)>,
         }
-        let golden: Golden = serde_json::from_str(include_str!("../tests/golden.json")).unwrap();
+        let golden: Golden = serde_json::from_str(include_str!("../../tests/golden.json")).unwrap();
         for Resized { width, height, samples } in golden.resize {
             let pixel = |x: usize, y: usize| [0, 31, 62].map(|c| ((x * 7 + y * 13 + c + x * y % 17 * 5) % 256) as u8);
             let pixels = (0..width * height).map(|index| pixel(index % width, index / width)).collect();

@@ -204,7 +204,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kernels::testing::{Arena, levels, noise};
+    use crate::engine::kernels::testing::{Arena, levels, noise};
 
     proptest! {
         #[test]

@@ -42,7 +42,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kernels::testing::{Arena, levels};
+    use crate::engine::kernels::testing::{Arena, levels};
 
     proptest! {
         #[test]

@@ -2,7 +2,7 @@
 
 use super::lower::{Lowering, Step};
 use super::view::View;
-use crate::onnx::Node;
+use crate::engine::onnx::Node;
 
 impl<'m> Lowering<'m> {
     pub(super) fn gather(&self, node: &Node<'m>) -> Step<View> {

@@ -11,7 +11,7 @@ mod view;
 
 pub(crate) use lower::lower;
 
-use crate::kernels::integers::Scale;
+use crate::engine::kernels::integers::Scale;
 
 /// Index into [`Network::planes`].
 pub(crate) type Plane = usize;

@@ -1,17 +1,26 @@
 //! YOLO-FastestV2 behind the core's `Detector` trait: model file and image in, boxes out.
 
+pub(crate) mod coco;
+pub(crate) mod decode;
+pub(crate) mod metadata;
+pub(crate) mod preprocess;
+
 use std::path::Path;
 
 use fearless_simd::Level;
 use yfslam::image::RgbImage;
 use yfslam::{Detection, Detector, DetectorError};
 
-use crate::config::{COCO_ANCHORS, COCO_NAMES, DetectorConfig};
-use crate::decode::{Grid, fuse, suppress};
-use crate::onnx::Model;
-use crate::plan::Plan;
-use crate::preprocess::Stretch;
-use crate::{ModelError, graph};
+use crate::config::DetectorConfig;
+use crate::engine::graph;
+use crate::engine::onnx::Model;
+use crate::engine::plan::{Map, Plan};
+use crate::error::ModelError;
+use crate::network::Network;
+use coco::COCO_ANCHORS;
+use decode::{Grid, fuse, suppress};
+use metadata::{class_names, parse_anchors};
+use preprocess::Stretch;
 
 /// The detector network, loaded and ready. It runs on the calling thread and, once the first image of a size has passed, allocates
 /// nothing but what the caller's list needs to grow.
@@ -53,7 +62,7 @@ impl YoloFastestV2 {
     /// As [`YoloFastestV2::load`].
     pub fn from_bytes(name: &str, bytes: &[u8], config: &DetectorConfig) -> Result<Self, ModelError> {
         let mismatch = |what: String| ModelError::Mismatch { model: name.into(), what };
-        check(config).map_err(mismatch)?;
+        config.check().map_err(mismatch)?;
         let model = Model::parse(bytes).map_err(|error| ModelError::NotOnnx { model: name.into(), what: error.0 })?;
         let mut config = config.clone();
         if config.anchors.is_empty() {
@@ -102,7 +111,7 @@ impl YoloFastestV2 {
 
     /// The raw outputs of the last image or forward pass, in the order of the model file.
     pub fn raw_outputs(&self) -> Vec<RawOutput> {
-        let output = |map: &crate::plan::Map| RawOutput {
+        let output = |map: &Map| RawOutput {
             name: map.name.clone(),
             shape: [map.planes.len(), map.size.0, map.size.1],
             values: (0..map.planes.len()).flat_map(|plane| self.plan.plane(map, plane)).copied().collect(),
@@ -110,6 +119,8 @@ impl YoloFastestV2 {
         self.plan.outputs.iter().map(output).collect()
     }
 }
+
+impl Network for YoloFastestV2 {}
 
 impl Detector for YoloFastestV2 {
     fn class_names(&self) -> &[String] {
@@ -140,73 +151,5 @@ impl Detector for YoloFastestV2 {
         }
         out.retain(|detection| detection.bbox.area() > 0.0);
         Ok(())
-    }
-}
-
-/// The names of a model's classes: those configured, else its own, else those of COCO.
-pub(crate) fn class_names(model: &Model, config: &DetectorConfig, classes: usize) -> Result<Vec<String>, String> {
-    let names = match model.metadata.get("names") {
-        _ if !config.class_names.is_empty() => config.class_names.clone(),
-        Some(text) => parse_names(text),
-        None if classes == COCO_NAMES.len() => COCO_NAMES.map(String::from).into(),
-        None => return Err(format!("the model has {classes} classes without names; set `class_names`")),
-    };
-    if names.len() == classes {
-        Ok(names)
-    } else {
-        Err(format!("the model has {classes} classes, but {} names are given", names.len()))
-    }
-}
-
-/// Refuses values with which no network can be run.
-pub(crate) fn check(config: &DetectorConfig) -> Result<(), String> {
-    let DetectorConfig { score_threshold, iou_threshold, fuse_iou, anchors, .. } = config;
-    if !(*score_threshold > 0.0 && *score_threshold < 1.0) {
-        return Err(format!("score_threshold = {score_threshold} must lie between 0 and 1"));
-    }
-    if !(*iou_threshold > 0.0 && *iou_threshold <= 1.0) {
-        return Err(format!("iou_threshold = {iou_threshold} must lie between 0 and 1"));
-    }
-    if !(*fuse_iou > 0.0 && *fuse_iou <= 1.0) {
-        return Err(format!("fuse_iou = {fuse_iou} must lie between 0 and 1"));
-    }
-    let wrong = |anchor: &&[f32; 2]| anchor.iter().any(|side| !(side.is_finite() && *side > 0.0));
-    match anchors.iter().flatten().find(wrong) {
-        Some(anchor) => Err(format!("anchors: {anchor:?} must be a width and a height above 0 px")),
-        None => Ok(()),
-    }
-}
-
-/// Class names in a model's metadata: `{0: 'person', 1: 'chair'}`, `["person", "chair"]` or `person, chair`.
-pub(crate) fn parse_names(text: &str) -> Vec<String> {
-    let inner = text.trim().trim_matches(['{', '}', '[', ']']);
-    let name = |entry: &str| {
-        let name = entry.split_once(':').map_or(entry, |(_, name)| name);
-        name.trim().trim_matches(['\'', '"']).to_owned()
-    };
-    inner.split(',').map(name).filter(|name| !name.is_empty()).collect()
-}
-
-/// Anchors in a model's metadata: widths and heights in pairs, six pairs, whatever brackets and commas stand between.
-fn parse_anchors(text: &str) -> Option<Vec<Vec<[f32; 2]>>> {
-    let numbers = text.split(|c: char| !(c.is_ascii_digit() || c == '.')).filter(|word| !word.is_empty());
-    let numbers: Vec<f32> = numbers.map(|word| word.parse().ok().filter(|side| *side > 0.0)).collect::<Option<_>>()?;
-    let (pairs, rest) = numbers.as_chunks::<2>();
-    let (grids, odd) = pairs.as_chunks::<3>();
-    (grids.len() == 2 && rest.is_empty() && odd.is_empty()).then(|| grids.iter().map(|grid| grid.to_vec()).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn metadata_is_read_in_the_usual_spellings() {
-        for text in ["{0: 'person', 1: 'dining table'}", r#"["person", "dining table"]"#, "person,dining table"] {
-            assert_eq!(parse_names(text), ["person", "dining table"], "{text}");
-        }
-        let anchors = parse_anchors("[[[1,2],[3,4.5],[5,6]],[[7,8],[9,10],[11,12]]]").unwrap();
-        assert_eq!(anchors, [[[1.0, 2.0], [3.0, 4.5], [5.0, 6.0]], [[7.0, 8.0], [9.0, 10.0], [11.0, 12.0]]]);
-        assert_eq!(parse_anchors("1,2,3"), None);
     }
 }

@@ -44,7 +44,7 @@ mod testing {
     use fearless_simd::Level;
 
     use super::WIDEST;
-    use crate::places::stride;
+    use crate::engine::buffer_planner::stride;
 
     /// What lies behind the planes and must stay.
     const SENTINEL: f32 = 12345.0;

@@ -1,13 +1,13 @@
 //! Where each plane lies: planes whose last reader has run give their memory to later ones, so that the working set stays in
 //! the second-level cache.
 
-use crate::graph::{Network, Plane};
-use crate::kernels::WIDEST;
-use crate::kernels::depthwise::ROWS;
+use crate::engine::graph::{Network, Plane};
+use crate::engine::kernels::WIDEST;
+use crate::engine::kernels::depthwise::ROWS;
 
 /// Hands out memory in the order of execution.
 #[derive(Debug)]
-pub(crate) struct Places<'n> {
+pub(crate) struct BufferPlanner<'n> {
     network: &'n Network,
     /// Time (index of the layer) at which each plane is read last.
     last_read: Vec<usize>,
@@ -25,7 +25,7 @@ struct Block {
     last_read: usize,
 }
 
-impl<'n> Places<'n> {
+impl<'n> BufferPlanner<'n> {
     pub(crate) fn new(network: &'n Network) -> Self {
         let mut last_read = vec![0; network.planes.len()];
         for (time, layer) in network.layers.iter().enumerate() {
@@ -35,7 +35,7 @@ impl<'n> Places<'n> {
         Self { network, last_read, offsets: vec![0; network.planes.len()], live: Vec::new(), end: 0 }
     }
 
-    /// Places `planes` (of equal size), which are written at `time`, and `padding` more that nobody reads. Returns the offsets of
+    /// BufferPlanner `planes` (of equal size), which are written at `time`, and `padding` more that nobody reads. Returns the offsets of
     /// all.
     pub(crate) fn planes(&mut self, planes: &[Plane], padding: usize, time: usize) -> Vec<usize> {
         let stride = stride(self.network.planes[planes[0]]);

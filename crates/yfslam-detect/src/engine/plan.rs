@@ -2,13 +2,13 @@
 
 use fearless_simd::Level;
 
-use crate::ModelError;
-use crate::graph::{Kind, Layer, Network};
-use crate::kernels::integers::{self, IntegerMatrix};
-use crate::kernels::matmul::{self, Matrix, Rows};
-use crate::kernels::{WIDEST, depthwise, stem, upsample};
-use crate::memory::Memory;
-use crate::places::Places;
+use crate::engine::buffer_planner::BufferPlanner;
+use crate::engine::graph::{Kind, Layer, Network};
+use crate::engine::kernels::integers::{self, IntegerMatrix};
+use crate::engine::kernels::matmul::{self, Matrix, Rows};
+use crate::engine::kernels::{WIDEST, depthwise, stem, upsample};
+use crate::engine::memory::Memory;
+use crate::error::ModelError;
 
 /// Largest working memory, floats (1 GiB); the real network needs about 1 % of it.
 const MAX_MEMORY: usize = 1 << 28;
@@ -57,33 +57,34 @@ enum Operation {
 }
 
 impl Plan {
-    /// Places `network`, which computes in integers what it can if `integers` says so; `name` is what errors call it.
+    /// BufferPlanner `network`, which computes in integers what it can if `integers` says so; `name` is what errors call it.
     pub(crate) fn new(name: &str, network: Network, level: Level, integers: bool) -> Result<Self, ModelError> {
         if integers && network.layers.iter().all(|layer| layer.scale.is_none()) {
             let what =
                 "it does not say how to compute with integers (`integers`); `python -m train.quantize` measures that";
             return Err(ModelError::Mismatch { model: name.into(), what: what.into() });
         }
-        let mut places = Places::new(&network);
-        let input = places.planes(&network.input, 0, 0);
+        let mut buffers = BufferPlanner::new(&network);
+        let input = buffers.planes(&network.input, 0, 0);
         let layers = network.layers.iter().enumerate();
-        let steps: Vec<Step> = layers.map(|(time, layer)| step(&network, layer, time, &mut places, integers)).collect();
+        let steps: Vec<Step> =
+            layers.map(|(time, layer)| step(&network, layer, time, &mut buffers, integers)).collect();
         let scratch = steps.iter().map(|step| step.operation.scratch()).max().unwrap_or(0);
         let words = steps.iter().map(|step| step.operation.words()).max().unwrap_or(0);
-        if places.end() + scratch > MAX_MEMORY {
-            let mebibytes = (places.end() + scratch) >> 18;
+        if buffers.end() + scratch > MAX_MEMORY {
+            let mebibytes = (buffers.end() + scratch) >> 18;
             let what = format!("the network needs {mebibytes} MiB of working memory; it is no small detector");
             return Err(ModelError::Mismatch { model: name.into(), what });
         }
         let map = |(name, planes): &(String, Vec<usize>)| Map {
             name: name.clone(),
             size: network.planes[planes[0]],
-            planes: places.offsets(planes),
+            planes: buffers.offsets(planes),
         };
         Ok(Self {
             level,
             // Vectors may read past the end of the last plane.
-            memory: Memory::new(places.end() + 4 * WIDEST),
+            memory: Memory::new(buffers.end() + 4 * WIDEST),
             scratch: Memory::new(scratch),
             words: vec![0; words],
             steps,
@@ -133,9 +134,9 @@ impl Plan {
 
 impl Operation {
     /// What computes `layer`, whose inputs have `size`.
-    fn new(layer: &Layer, size: (usize, usize), places: &Places, integers: bool) -> Self {
+    fn new(layer: &Layer, size: (usize, usize), buffers: &BufferPlanner, integers: bool) -> Self {
         let addend = |rows: usize| {
-            let mut addend = places.offsets(&layer.addend);
+            let mut addend = buffers.offsets(&layer.addend);
             addend.resize(if addend.is_empty() { 0 } else { rows }, 0);
             addend
         };
@@ -196,10 +197,10 @@ impl Operation {
     }
 }
 
-/// Places the outputs of the layer that runs at `time`.
-fn step(network: &Network, layer: &Layer, time: usize, places: &mut Places, integers: bool) -> Step {
-    let operation = Operation::new(layer, network.planes[layer.inputs[0]], places, integers);
+/// BufferPlanner the outputs of the layer that runs at `time`.
+fn step(network: &Network, layer: &Layer, time: usize, buffers: &mut BufferPlanner, integers: bool) -> Step {
+    let operation = Operation::new(layer, network.planes[layer.inputs[0]], buffers, integers);
     let padding = operation.padding(layer.outputs.len());
-    let inputs = places.offsets(&layer.inputs);
-    Step { operation, inputs, outputs: places.planes(&layer.outputs, padding, time) }
+    let inputs = buffers.offsets(&layer.inputs);
+    Step { operation, inputs, outputs: buffers.planes(&layer.outputs, padding, time) }
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::view::View;
 use super::{Kind, Network, fold};
-use crate::ModelError;
-use crate::kernels::integers::Scale;
-use crate::onnx::{FLOAT, Model, Node, Tensor, TensorData};
+use crate::engine::kernels::integers::Scale;
+use crate::engine::onnx::{FLOAT, Model, Node, Tensor, TensorData};
+use crate::error::ModelError;
 
 /// Largest side of the network input and of any plane, px.
 pub(super) const MAX_SIDE: usize = 2048;

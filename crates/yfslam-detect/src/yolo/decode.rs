@@ -6,8 +6,9 @@
 
 use yfslam::{BoundingBox, Detection};
 
-use crate::plan::{Map, Plan};
-use crate::{DetectorConfig, ModelError};
+use crate::config::DetectorConfig;
+use crate::engine::plan::{Map, Plan};
+use crate::error::ModelError;
 
 /// One grid of the network's output.
 #[derive(Debug)]

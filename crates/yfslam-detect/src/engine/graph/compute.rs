@@ -3,7 +3,7 @@
 use super::lower::{Lowering, MAX_SIDE, Step};
 use super::view::{MAX_PLANES, View};
 use super::{Kind, Layer};
-use crate::onnx::Node;
+use crate::engine::onnx::Node;
 
 impl<'m> Lowering<'m> {
     pub(super) fn conv(&mut self, node: &Node<'m>) -> Step<View> {
