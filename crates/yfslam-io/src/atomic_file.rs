@@ -1,4 +1,4 @@
-//! Writes files whole or not at all.
+//! Writes files completely or not at all.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 
-/// Writes `path` by `write`: into a temporary file beside it that takes its place once all of it is on the disk.
+/// Writes `path` with `write`: into a temporary file beside it, which replaces `path` once all of it is on the disk.
 ///
-/// Missing folders are made. If anything fails, what stood at `path` stays and no part of the new file is left. A link is followed;
-/// a device or pipe is written directly.
+/// Missing folders are created. After an error an old file is unchanged, and no part of the new one remains. Links are followed;
+/// devices and pipes are written directly.
 ///
 /// # Errors
-/// [`Error::Write`], also for whatever error `write` returns.
+/// [`Error::Write`], also for an error of `write`.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     write_or_io_error(path, write).map_err(|source| Error::write(path, source))
 }
@@ -33,7 +33,7 @@ fn write_or_io_error(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resu
     let (temporary, file) = Temporary::create(folder)?;
     write_through(file, write)?;
     temporary.rename_to(&target)?;
-    // The new name itself is safe once the folder is; file systems that cannot do this lose nothing else.
+    // The new name is on the disk once the folder is; on file systems that cannot do this, only the name may be lost.
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
     Ok(())
 }
@@ -46,7 +46,7 @@ fn write_through(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()
     if is_regular { file.sync_all() } else { Ok(()) }
 }
 
-/// A temporary file or folder that is removed unless it was renamed, also when its writer panics.
+/// A temporary file or folder, which is removed unless it was renamed, also when its writer panics.
 #[derive(Debug)]
 pub(crate) struct Temporary(PathBuf);
 
@@ -59,7 +59,7 @@ impl Temporary {
         Ok(Self::claim(folder, |path| fs::create_dir(path))?.0)
     }
 
-    /// Moves what stands at `path` to a temporary name beside it.
+    /// Moves `path` to a temporary name beside it.
     pub(crate) fn aside(path: &Path) -> io::Result<Self> {
         let path = path.canonicalize()?;
         let aside = Self::create_folder(path.parent().unwrap_or(Path::new(".")))?;
@@ -67,15 +67,15 @@ impl Temporary {
         Ok(aside)
     }
 
-    /// Takes a name that nobody has.
-    fn claim<T>(folder: &Path, take: impl Fn(&Path) -> io::Result<T>) -> io::Result<(Self, T)> {
+    /// Creates a file or folder with an unused name.
+    fn claim<T>(folder: &Path, create: impl Fn(&Path) -> io::Result<T>) -> io::Result<(Self, T)> {
         static COUNTER: AtomicU64 = AtomicU64::new(0);
         loop {
             let number = COUNTER.fetch_add(1, Ordering::Relaxed);
             let path = folder.join(format!(".yfslam-{}-{number}.tmp", std::process::id()));
-            match take(&path) {
-                Ok(taken) => return Ok((Self(path), taken)),
-                // Left behind by a process of the same number that was killed.
+            match create(&path) {
+                Ok(created) => return Ok((Self(path), created)),
+                // The file of a process with the same number that was killed.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
@@ -96,7 +96,7 @@ impl Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if !self.0.as_os_str().is_empty() {
-            // One of them it is.
+            // It is either a file or a folder.
             let _ = fs::remove_file(&self.0).or_else(|_| fs::remove_dir_all(&self.0));
         }
     }

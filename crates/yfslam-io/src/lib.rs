@@ -1,15 +1,15 @@
-//! Sequences and formats, in and out.
+//! Reads recordings, cameras and trajectories, and writes the products of a run.
 //!
 //! ```text
 //! folder ──Sequence──► entries ──FrameStream──► RgbdFrame, or a FrameError for a frame that cannot be used
 //!   TUM, EuRoC, KITTI              decoded, stereo pairs rectified
 //! preset, settings file or TOML ──load_camera──► Camera
 //! frames ──FaultInjector──► frames as a faulty camera sends them ──RecordingWriter──► folder, with its BoxList
-//! trajectory file ◄──► TrajectoryFile        points, pictures, text ──write_atomically──► files
+//! trajectory file ◄──► TrajectoryFile        points, images, text ──write_atomically──► files
 //! ```
 //!
-//! An [`Error`] ends what was asked for: it names the file, the value and the cure. A [`FrameError`] concerns one frame; the
-//! caller counts it and goes on.
+//! An [`Error`] ends an operation: it names the file, what is wrong with which value, and what to do. A [`FrameError`] concerns one
+//! frame; the caller counts it and continues.
 //!
 //! ```no_run
 //! use yfslam_io::{FrameStream, Result, Sequence, SequenceOptions, check_recording, detect_camera, stream};
@@ -55,3 +55,8 @@ pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};
 pub use trajectory::{StampedPose, TrajectoryFile, write_trajectory};
 pub use write::RecordingWriter;
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,15 +1,15 @@
-//! Puts recordings with glitches in their time stamps in order: what repeats or runs backward is dropped and counted.
+//! Removes repeated and backward time stamps from a recording and counts them.
 
 use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// Items whose stamps ascend strictly, and the count of those that were dropped for it.
+/// Items whose stamps ascend strictly, and how many were dropped.
 #[derive(Debug)]
 pub struct Kept<T> {
-    /// What was kept, in its order.
+    /// The kept items in their order.
     pub items: Vec<T>,
-    /// Items dropped because their stamp is there already.
+    /// Items dropped because their stamp occurred before.
     pub duplicates: usize,
     /// Items dropped because their stamp runs backward against its neighbours.
     pub backward: usize,
@@ -18,7 +18,7 @@ pub struct Kept<T> {
 /// Drops the fewest items that make the stamps ascend strictly.
 ///
 /// # Errors
-/// More than half of the stamps run backward: `path` is then not a recording with glitches but an unsorted file.
+/// More than half of the stamps run backward: then `path` is an unsorted file.
 pub fn keep_ascending<T>(items: Vec<T>, stamp_ns: impl Fn(&T) -> i64, path: &Path) -> Result<Kept<T>> {
     let found = ascending(&items.iter().map(stamp_ns).collect::<Vec<_>>());
     if found.backward > items.len() / 2 {
@@ -31,22 +31,22 @@ pub fn keep_ascending<T>(items: Vec<T>, stamp_ns: impl Fn(&T) -> i64, path: &Pat
     Ok(Kept { items, duplicates: found.duplicates, backward: found.backward })
 }
 
-/// Which entries of a list of stamps to keep so that the stamps ascend strictly and the fewest entries are lost.
+/// The longest strictly ascending selection from a list of stamps.
 #[derive(Debug, PartialEq, Eq)]
 struct Ascending {
     /// Indices kept, ascending.
     kept: Vec<usize>,
-    /// Entries dropped because their stamp is there already.
+    /// Entries dropped because their stamp occurred before.
     duplicates: usize,
     /// Entries dropped because their stamp runs backward against its neighbours.
     backward: usize,
 }
 
-/// Finds the longest strictly ascending subsequence (patience sorting).
+/// Finds the longest strictly ascending subsequence by patience sorting.
 ///
-/// One stamp far in the future thus costs one entry, not all that follow it.
+/// A single stamp far in the future costs one entry and not all that follow.
 fn ascending(stamps_ns: &[i64]) -> Ascending {
-    // From the end, so that where two entries contradict each other the earlier one stays.
+    // Backward, so that the earlier of two contradicting entries is kept.
     // heads[k]: index of the largest stamp that begins an ascending run of k + 1 entries.
     let mut heads: Vec<usize> = Vec::new();
     let mut next = vec![None; stamps_ns.len()];
@@ -82,7 +82,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_kept_ascends_and_everything_is_accounted_for(stamps in prop::collection::vec(-20i64..20, 0..60)) {
+        fn kept_stamps_ascend_and_every_entry_is_counted(stamps in prop::collection::vec(-20i64..20, 0..60)) {
             let found = ascending(&stamps);
             prop_assert!(found.kept.windows(2).all(|w| w[0] < w[1] && stamps[w[0]] < stamps[w[1]]));
             prop_assert_eq!(found.kept.len() + found.duplicates + found.backward, stamps.len());

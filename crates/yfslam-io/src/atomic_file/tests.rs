@@ -12,7 +12,7 @@ fn put(path: &Path, text: &str) -> Result<()> {
 }
 
 #[test]
-fn a_file_is_written_replaced_and_its_folders_are_made() {
+fn a_file_is_written_and_replaced_and_its_folders_are_created() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a/b/poses.txt");
     put(&path, "old").unwrap();
@@ -41,7 +41,7 @@ fn a_failed_write_leaves_the_old_file_and_no_part_of_the_new() {
 }
 
 #[test]
-fn a_full_device_is_an_error_also_when_it_shows_only_at_the_flush() {
+fn a_full_device_is_an_error_also_if_only_the_flush_fails() {
     let error = put(Path::new("/dev/full"), "few bytes").unwrap_err().to_string();
     assert!(error.contains("/dev/full") && error.contains("free some space"), "{error}");
     put(Path::new("/dev/null"), "few bytes").unwrap();

@@ -1,6 +1,6 @@
-//! The true poses of a sequence's camera, in the formats of the benchmarks.
+//! Reads the ground truth of a sequence in the formats of the benchmarks.
 //!
-//! In: a file. Out: poses of the camera of the frames, world from camera, whatever the file has poses of.
+//! In: a file. Out: poses of the camera of the frames, world from camera, also if the file contains those of another camera or a body.
 
 use std::path::{Path, PathBuf};
 
@@ -13,24 +13,24 @@ use crate::trajectory::TrajectoryFile;
 
 /// Reads the ground truth of a sequence.
 #[derive(Clone, Debug)]
-pub struct TruthReader {
-    /// Where it lies if it is there.
+pub struct GroundTruthReader {
+    /// Where the file is expected.
     path: Option<PathBuf>,
     format: Format,
 }
 
-/// What a file of the layout says.
+/// Content of the ground truth file of a layout.
 #[derive(Clone, Debug)]
 enum Format {
     /// Poses of the camera.
     Tum,
-    /// Poses of the body, in which the camera has the given pose.
+    /// Poses of the body; the camera has the given pose in the body frame.
     Euroc(Isometry3<f64>),
-    /// Matrices of camera 0, in which the camera has the given pose, at the given times, ns.
+    /// Matrices of camera 0 at the given times, ns; the camera has the given pose in the frame of camera 0.
     Kitti(Isometry3<f64>, Vec<i64>),
 }
 
-impl TruthReader {
+impl GroundTruthReader {
     pub(super) fn tum(path: PathBuf) -> Self {
         Self { path: Some(path), format: Format::Tum }
     }
@@ -43,21 +43,21 @@ impl TruthReader {
         Self { path, format: Format::Kitti(t_cam0_cam, stamps_ns) }
     }
 
-    /// The file in the folder, if there is one.
+    /// Returns the file in the folder if it exists.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref().filter(|path| path.is_file())
     }
 
-    /// Reads `path`, in the format of the benchmark or in TUM's; in TUM's the poses are the camera's own.
+    /// Reads `path` in the format of the benchmark or of TUM; in the format of TUM the poses are those of the camera.
     ///
     /// # Errors
-    /// It cannot be read, or a line is no pose.
+    /// The file cannot be read, or a line is malformed.
     pub fn read(&self, path: &Path) -> Result<TrajectoryFile> {
         let text = read_text(path)?;
         match &self.format {
-            Format::Euroc(t_body_cam) if text.contains(',') => euroc::parse_truth(&text, path, t_body_cam),
-            Format::Kitti(t_cam0_cam, stamps_ns) if kitti::is_truth(&text) => {
-                kitti::parse_truth(&text, path, t_cam0_cam, stamps_ns)
+            Format::Euroc(t_body_cam) if text.contains(',') => euroc::parse_ground_truth(&text, path, t_body_cam),
+            Format::Kitti(t_cam0_cam, stamps_ns) if kitti::is_ground_truth(&text) => {
+                kitti::parse_ground_truth(&text, path, t_cam0_cam, stamps_ns)
             }
             _ => TrajectoryFile::parse(&text, path),
         }

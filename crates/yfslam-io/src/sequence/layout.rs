@@ -1,23 +1,23 @@
-//! How a folder is laid out, which says where its lists, its calibration and its ground truth are.
+//! Layouts of sequence folders: where the lists, the calibration and the ground truth are.
 //!
-//! In: a folder. Out: its frames, before any part is cut out, with paths relative to it.
+//! In: a folder. Out: all its frames, with paths relative to it.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use yfslam::config::DepthSource;
 
-use super::{AssociationReport, FrameEntry, SequenceOptions, TruthReader, euroc, kitti, tum};
+use super::{AssociationReport, FrameEntry, GroundTruthReader, SequenceOptions, euroc, kitti, tum};
 use crate::camera::CameraSource;
 use crate::error::{Error, Result};
 use crate::rectify::StereoRectification;
 
-/// How a recorded sequence is laid out.
+/// Layout of a recorded sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// The TUM RGB-D benchmark (Sturm et al., IROS 2012): `rgb.txt` with `depth.txt` or, from a stereo camera, `right.txt`.
     Tum,
-    /// The EuRoC MAV data set in ASL format (Burri et al., IJRR 2016): `mav0/cam0/data.csv` and so on; pictures are not rectified.
+    /// The EuRoC MAV data set in ASL format (Burri et al., IJRR 2016): `mav0/cam0/data.csv` and so on; images are not rectified.
     Euroc,
     /// The KITTI odometry benchmark (Geiger et al., CVPR 2012): `times.txt`, `calib.txt`, `image_2/` or `image_0/`.
     Kitti,
@@ -28,21 +28,21 @@ pub enum Layout {
 pub struct Calibration {
     /// The camera of the frames, after rectification.
     pub camera: CameraSource,
-    /// How the pictures are rectified, where they are not yet.
+    /// Rectification of the images, unless they are rectified already.
     pub rectification: Option<Arc<StereoRectification>>,
 }
 
-/// What a folder lists.
+/// Content of a sequence folder.
 pub struct Listing {
     pub depth_source: DepthSource,
     pub entries: Vec<FrameEntry>,
     pub report: AssociationReport,
     pub calibration: Option<Calibration>,
-    pub truth: TruthReader,
+    pub ground_truth: GroundTruthReader,
 }
 
 impl Layout {
-    /// The layout of `folder`; one that is none of the others is taken for TUM's.
+    /// Detects the layout of `folder`; the default is that of TUM.
     pub fn of(folder: &Path) -> Self {
         if euroc::root(folder).is_some() {
             Self::Euroc
@@ -53,7 +53,7 @@ impl Layout {
         }
     }
 
-    /// Its name, and whose it is.
+    /// Returns the name of the layout.
     pub fn name(self) -> &'static str {
         match self {
             Self::Tum => "TUM RGB-D",
@@ -72,19 +72,19 @@ impl Layout {
     }
 }
 
-/// The source of depth that was asked for, or that a stereo benchmark has.
+/// Chooses the source of depth in a folder of a stereo benchmark.
 pub fn stereo_or_mono(folder: &Path, options: &SequenceOptions, has_right: bool) -> Result<DepthSource> {
     match options.depth_source {
-        Some(DepthSource::Image) => Err(lacks(folder, DepthSource::Image)),
-        Some(DepthSource::Stereo) if !has_right => Err(lacks(folder, DepthSource::Stereo)),
+        Some(DepthSource::Image) => Err(missing_images(folder, DepthSource::Image)),
+        Some(DepthSource::Stereo) if !has_right => Err(missing_images(folder, DepthSource::Stereo)),
         Some(wanted) => Ok(wanted),
         None if has_right => Ok(DepthSource::Stereo),
-        None => Err(lacks(folder, DepthSource::Stereo)),
+        None => Err(missing_images(folder, DepthSource::Stereo)),
     }
 }
 
 /// Refuses a folder that does not have the images that were asked for.
-pub fn lacks(folder: &Path, wanted: DepthSource) -> Error {
-    let what = if wanted == DepthSource::Stereo { "right pictures" } else { "depth images" };
-    Error::content(folder, format!("has no {what}"), "name what it has: --sensor rgbd, stereo or mono")
+pub fn missing_images(folder: &Path, wanted: DepthSource) -> Error {
+    let what = if wanted == DepthSource::Stereo { "right images" } else { "depth images" };
+    Error::content(folder, format!("has no {what}"), "choose the sensor with --sensor rgbd, stereo or mono")
 }

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use yfslam::config::DepthSource;
 
-use super::layout::{Listing, lacks};
+use super::layout::{Listing, missing_images};
 use super::pairs::{List, from_associations, from_lists};
-use super::{SequenceOptions, TruthReader};
+use super::{GroundTruthReader, SequenceOptions};
 use crate::error::{Error, Result};
 
 /// Lists the frames of `folder`.
@@ -20,14 +20,14 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
         false => DepthSource::Stereo,
     });
     let read = |name: &str| List::read(folder.join(name));
-    let paired = |companions: &str| {
-        if !has("rgb.txt") || !has(companions) {
+    let paired = |list: &str| {
+        if !has("rgb.txt") || !has(list) {
             return Err(match options.depth_source.filter(|_| has("rgb.txt")) {
-                Some(wanted) => lacks(folder, wanted),
-                None => no_lists(folder, &["rgb.txt", companions]),
+                Some(wanted) => missing_images(folder, wanted),
+                None => no_lists(folder, &["rgb.txt", list]),
             });
         }
-        from_lists(folder, read("rgb.txt")?, Some(read(companions)?), options.association_tolerance_ns)
+        from_lists(folder, read("rgb.txt")?, Some(read(list)?), options.association_tolerance_ns)
     };
     let (entries, report) = match wanted {
         DepthSource::Image if associations => from_associations(&folder.join("associations.txt"))?,
@@ -36,13 +36,13 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
         DepthSource::Motion if has("rgb.txt") => from_lists(folder, read("rgb.txt")?, None, 0)?,
         DepthSource::Motion if associations => {
             let (mut entries, report) = from_associations(&folder.join("associations.txt"))?;
-            entries.iter_mut().for_each(|entry| entry.companion = None);
+            entries.iter_mut().for_each(|entry| entry.paired_image = None);
             (entries, report)
         }
         DepthSource::Motion => return Err(no_lists(folder, &["rgb.txt"])),
     };
-    let truth = TruthReader::tum(folder.join("groundtruth.txt"));
-    Ok(Listing { depth_source: wanted, entries, report, calibration: None, truth })
+    let ground_truth = GroundTruthReader::tum(folder.join("groundtruth.txt"));
+    Ok(Listing { depth_source: wanted, entries, report, calibration: None, ground_truth })
 }
 
 /// Names the lists that are missing and, if a folder inside has them, that folder.

@@ -1,4 +1,4 @@
-//! One thread that decodes one kind of image, in order, held back by a bounded channel.
+//! Decodes one kind of image ahead of its use, in order, on a thread with a bounded queue.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -9,23 +9,23 @@ use super::FrameFault;
 use crate::error::{Error, Result};
 use crate::sequence::FrameEntry;
 
-/// One image as its thread hands it over.
+/// One decoded image.
 pub struct Decoded<T> {
-    /// The image, or why there is none.
+    /// The image, or why it cannot be used.
     pub image: std::result::Result<Arc<T>, FrameFault>,
-    /// Time of reading and decoding.
+    /// Time for reading and decoding.
     pub took: Duration,
 }
 
-/// A thread that decodes one kind of image, in order.
-pub struct Lane<T> {
+/// A queue of images that a thread decodes in order.
+pub struct PrefetchQueue<T> {
     /// `None` only while dropping.
     images: Option<Receiver<Decoded<T>>>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl<T: Send + Sync + 'static> Lane<T> {
-    /// Starts to decode `entries`; up to `look_ahead` images wait to be taken.
+impl<T: Send + Sync + 'static> PrefetchQueue<T> {
+    /// Starts to decode `entries`; up to `look_ahead` decoded images wait in the queue.
     pub fn start(
         name: &str,
         entries: Arc<[FrameEntry]>,
@@ -46,24 +46,24 @@ impl<T: Send + Sync + 'static> Lane<T> {
         let thread = Builder::new().name(name.into()).spawn(run).map_err(|error| {
             Error::argument(
                 format!("cannot start a decoder thread: {error}"),
-                "raise the limit of threads of this user",
+                "raise the limit of threads for this user",
             )
         })?;
         Ok(Self { images: Some(images), thread: Some(thread) })
     }
 
-    /// Waits for the next image.
+    /// Returns the next image; waits until it is decoded.
     pub fn next(&mut self) -> Decoded<T> {
         let received = self.images.as_ref().and_then(|images| images.recv().ok());
         received.unwrap_or(Decoded { image: Err(FrameFault::DecoderStopped), took: Duration::ZERO })
     }
 }
 
-impl<T> Drop for Lane<T> {
+impl<T> Drop for PrefetchQueue<T> {
     fn drop(&mut self) {
         self.images = None;
         if let Some(thread) = self.thread.take() {
-            // A panic of the decoder has been reported as `DecoderStopped` already.
+            // A panic of the decoder has already been reported as `DecoderStopped`.
             let _ = thread.join();
         }
     }
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     fn entries(count: i64) -> Arc<[FrameEntry]> {
-        let entry = |t| FrameEntry { timestamp_ns: t, color_path: "c".into(), companion: None };
+        let entry = |t| FrameEntry { timestamp_ns: t, color_path: "c".into(), paired_image: None };
         (0..count).map(entry).collect()
     }
 
@@ -84,30 +84,30 @@ mod tests {
     fn no_more_is_decoded_than_the_look_ahead_allows_and_a_drop_ends_the_thread() {
         let decoded = Arc::new(AtomicUsize::new(0));
         let count = decoded.clone();
-        let mut lane = Lane::start("test", entries(1000), 3, move |entry| {
+        let mut queue = PrefetchQueue::start("test", entries(1000), 3, move |entry| {
             count.fetch_add(1, Ordering::SeqCst);
             Ok(entry.timestamp_ns)
         })
         .unwrap();
         for expected in 0..10 {
-            assert_eq!(*lane.next().image.unwrap(), expected);
+            assert_eq!(*queue.next().image.unwrap(), expected);
         }
-        // Ten taken, three waiting, one in the hands of the thread.
+        // Ten are taken, three wait, and the thread holds one.
         std::thread::sleep(Duration::from_millis(50));
         assert_eq!(decoded.load(Ordering::SeqCst), 14);
-        drop(lane);
-        assert_eq!(Arc::strong_count(&decoded), 1, "the thread and its decoder are gone");
+        drop(queue);
+        assert_eq!(Arc::strong_count(&decoded), 1, "the thread and its decoder have ended");
     }
 
     #[test]
-    fn a_panic_of_a_decoder_becomes_a_fault_of_every_frame_left() {
-        let mut lane = Lane::start("test", entries(3), 1, |entry| match entry.timestamp_ns {
+    fn a_panic_of_the_decoder_becomes_a_fault_of_every_remaining_frame() {
+        let mut queue = PrefetchQueue::start("test", entries(3), 1, |entry| match entry.timestamp_ns {
             0 => Ok(()),
             _ => panic!("a defect of the decoder"),
         })
         .unwrap();
-        assert!(lane.next().image.is_ok());
-        assert!(matches!(lane.next().image, Err(FrameFault::DecoderStopped)));
-        assert!(matches!(lane.next().image, Err(FrameFault::DecoderStopped)));
+        assert!(queue.next().image.is_ok());
+        assert!(matches!(queue.next().image, Err(FrameFault::DecoderStopped)));
+        assert!(matches!(queue.next().image, Err(FrameFault::DecoderStopped)));
     }
 }
