@@ -40,16 +40,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             if folder == "-" || seen.is_empty() {
                 return;
             }
-            let mut picture = shot.frame.color.as_ref().clone();
+            let mut rendering = shot.frame.color.as_ref().clone();
             for d in detections.iter().filter(|d| d.class == 0) {
-                outline(&mut picture, &d.bbox, [40, 80, 255]);
+                outline(&mut rendering, &d.bbox, [40, 80, 255]);
             }
             for s in seen {
-                outline(&mut picture, &s.bbox, if s.found { [0, 230, 0] } else { [255, 0, 0] });
+                outline(&mut rendering, &s.bbox, if s.found { [0, 230, 0] } else { [255, 0, 0] });
             }
             let miss = if seen.iter().any(|s| !s.found) { "miss" } else { "all" };
             let file = format!("{miss}_{}_{index:04}.png", spec.replace(['?', '&', '=', ':'], "-"));
-            failure = write_color_png(&Path::new(folder).join(file), &picture).err().or(failure.take());
+            failure = write_color_png(&Path::new(folder).join(file), &rendering).err().or(failure.take());
         });
         if let Some(error) = failure {
             return Err(error.into());

@@ -72,8 +72,8 @@ impl CameraPath {
         let keys = keys(motion, &mut rng);
         let seconds = config.frames as f64 / config.camera.fps;
         let (tour, sines) = match motion {
-            CameraMotion::Drive => (Some(Tour::new(&scene.round, DRIVE, seconds)), WHEELS),
-            CameraMotion::Loop => (Some(Tour::new(&scene.round, WALK, seconds / (1.0 + LOOP_OVERLAP))), HAND),
+            CameraMotion::Drive => (Some(Tour::new(&scene.circuit, DRIVE, seconds)), WHEELS),
+            CameraMotion::Loop => (Some(Tour::new(&scene.circuit, WALK, seconds / (1.0 + LOOP_OVERLAP))), HAND),
             _ => (None, HAND),
         };
         let shake = shake(config.hand_shake, sines, &mut rng);

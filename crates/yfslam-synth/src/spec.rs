@@ -35,7 +35,7 @@ const KEYS: &[(&str, &str)] = &[
     ("holes", "on or off: places without depth at edges, on grazing and on dark surfaces"),
     ("boxes", "on or off: exact person boxes as detections"),
     ("shadows", "on or off"),
-    ("exposure", "brightness of the picture, 1 is normal"),
+    ("exposure", "brightness of the image, 1 is normal"),
     ("flicker", "changing light, 0 to 1"),
 ];
 

@@ -36,16 +36,16 @@ pub const SUITE: &[NamedWorld] = &[
     world("sitting_halfsphere", "people sit and gesture; the camera moves on a half sphere", |c| {
         sitting(c, CameraMotion::Halfsphere);
     }),
-    world("walking_static", "people walk through the picture; the camera is held still", |c| {
+    world("walking_static", "people walk through the image; the camera is held still", |c| {
         walking(c, CameraMotion::Static);
     }),
-    world("walking_xyz", "people walk through the picture; the camera moves along its three axes", |c| {
+    world("walking_xyz", "people walk through the image; the camera moves along its three axes", |c| {
         walking(c, CameraMotion::Xyz);
     }),
-    world("walking_rpy", "people walk through the picture; the camera rolls, pitches and yaws", |c| {
+    world("walking_rpy", "people walk through the image; the camera rolls, pitches and yaws", |c| {
         walking(c, CameraMotion::Rpy);
     }),
-    world("walking_halfsphere", "people walk through the picture; the camera moves on a half sphere", |c| {
+    world("walking_halfsphere", "people walk through the image; the camera moves on a half sphere", |c| {
         walking(c, CameraMotion::Halfsphere);
     }),
     world(
@@ -64,7 +64,7 @@ pub const SUITE: &[NamedWorld] = &[
             c.actors.carried_box = true;
         },
     ),
-    world("crowd", "six people, one of whom sits and one sits down and gets up, fill half of the picture", |c| {
+    world("crowd", "six people, one of whom sits and one sits down and gets up, fill half of the image", |c| {
         (c.activity, c.motion) = (Activity::Crowd, CameraMotion::Xyz);
         (c.people, c.person_share) = (6, 0.5);
     }),

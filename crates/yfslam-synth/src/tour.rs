@@ -42,11 +42,12 @@ const LOOK_M: [f64; 2] = [-0.3, 0.9];
 impl Tour {
     /// A round through `corners` that takes `seconds` if the pace allows it, else as near as it does.
     pub fn new(corners: &[[f64; 2]], pace: Pace, seconds: f64) -> Self {
-        let way = rounded(corners, pace.rounding);
-        let looks = looks(&way);
-        let count = way.len();
-        let lengths: Vec<f64> = (0..count).map(|i| distance(way[i], way[(i + 1) % count])).collect();
-        let bends: Vec<f64> = (0..count).map(|i| angle_between(looks[i], looks[(i + 1) % count])).collect();
+        let route = rounded(corners, pace.rounding);
+        let view_directions = view_directions(&route);
+        let count = route.len();
+        let lengths: Vec<f64> = (0..count).map(|i| distance(route[i], route[(i + 1) % count])).collect();
+        let bends: Vec<f64> =
+            (0..count).map(|i| angle_between(view_directions[i], view_directions[(i + 1) % count])).collect();
         let times = |top: f64| -> Vec<f64> {
             let speeds: Vec<f64> =
                 lengths.iter().zip(&bends).map(|(l, a)| top.min(pace.turn * l / a.max(1e-9))).collect();
@@ -76,7 +77,8 @@ impl Tour {
             }
             let t = ((time - at) / steps[i]).min(1.0);
             let blend = |a: [f64; 2], b: [f64; 2]| [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
-            let ([x, y], [c, s]) = (blend(way[i], way[(i + 1) % count]), blend(looks[i], looks[(i + 1) % count]));
+            let ([x, y], [c, s]) =
+                (blend(route[i], route[(i + 1) % count]), blend(view_directions[i], view_directions[(i + 1) % count]));
             [x, y, c, s]
         });
         Self { ticks: ticks.collect(), tick, pace }
@@ -158,9 +160,9 @@ fn averaged<const N: usize>(values: &[[f64; N]], width: usize) -> Vec<[f64; N]> 
 }
 
 /// Unit direction of view at every point of the way.
-fn looks(way: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let count = way.len();
-    let at = |i: usize, metres: f64| way[(i as i64 + (metres / SPACING_M) as i64).rem_euclid(count as i64) as usize];
+fn view_directions(route: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let count = route.len();
+    let at = |i: usize, metres: f64| route[(i as i64 + (metres / SPACING_M) as i64).rem_euclid(count as i64) as usize];
     let chord = |i: usize| {
         let (from, to) = (at(i, LOOK_M[0]), at(i, LOOK_M[1]));
         let length = distance(from, to).max(1e-9);

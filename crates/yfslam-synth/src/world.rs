@@ -18,7 +18,7 @@ use crate::flicker;
 use crate::light::{Lights, Occluder};
 use crate::render::rays::RayTable;
 use crate::render::shade::View;
-use crate::render::{self, Backdrop, Picture};
+use crate::render::{self, Backdrop, Rendering};
 use crate::rng::hash;
 use crate::scene::Scene;
 use crate::sensor;
@@ -120,17 +120,17 @@ impl World {
     /// Renders frame `index`; numbers past the end go on with the same motion.
     pub fn frame(&self, index: usize) -> SynthFrame {
         let (time, t_world_cam) = (self.seconds(index), self.pose(index));
-        let picture = self.render(&self.rays, time, &t_world_cam);
+        let rendering = self.render(&self.rays, time, &t_world_cam);
         let noise = hash(self.config.seed, 0x4015_e000 + index as u64);
-        let color = self.expose(&self.rays, &picture, time, &Isometry3::identity(), hash(noise, 0));
+        let color = self.expose(&self.rays, &rendering, time, &Isometry3::identity(), hash(noise, 0));
         let mount = Isometry3::translation(self.config.stereo_m, 0.0, 0.0);
         let right = (self.config.stereo_m > 0.0).then(|| self.second(&self.rays, index, &mount));
         let depth = match right {
             Some(_) => DepthImage { raw: Image::new(self.rays.width, self.rays.height), metres_per_unit: 1.0 },
-            None => self.measure(&picture, time, hash(noise, 1)),
+            None => self.measure(&rendering, time, hash(noise, 1)),
         };
         let (width, height) = (self.rays.width, self.rays.height);
-        let boxes = self.boxes(&picture.instance);
+        let boxes = self.boxes(&rendering.instance);
         let detections = self.config.detections.then(|| {
             boxes.iter().map(|&(_, class, bbox)| Detection { class, score: 1.0, bbox }).collect::<Vec<Detection>>()
         });
@@ -145,8 +145,8 @@ impl World {
                 mask: None,
             },
             t_world_cam,
-            instances: image(width, height, picture.instance),
-            exact_depth: image(width, height, picture.depth),
+            instances: image(width, height, rendering.instance),
+            exact_depth: image(width, height, rendering.depth),
             boxes,
         }
     }
@@ -159,15 +159,15 @@ impl World {
 
     fn second(&self, rays: &RayTable, index: usize, mount: &Isometry3<f64>) -> RgbImage {
         let time = self.seconds(index);
-        let picture = self.render(rays, time, &(self.pose(index) * mount));
-        self.expose(rays, &picture, time, mount, hash(hash(self.config.seed, 0x4015_e000 + index as u64), 2))
+        let rendering = self.render(rays, time, &(self.pose(index) * mount));
+        self.expose(rays, &rendering, time, mount, hash(hash(self.config.seed, 0x4015_e000 + index as u64), 2))
     }
 
     fn seconds(&self, index: usize) -> f64 {
         index as f64 / self.config.camera.fps
     }
 
-    fn render(&self, rays: &RayTable, time: f64, t_world_cam: &Isometry3<f64>) -> Picture {
+    fn render(&self, rays: &RayTable, time: f64, t_world_cam: &Isometry3<f64>) -> Rendering {
         let brightness = flicker::brightness(self.config.light.flicker, self.config.seed, time);
         let (actors, occluders) = self.actors.at(time, &self.scene.lights.dimmed(brightness));
         let t_cam_world = t_world_cam.inverse();
@@ -185,33 +185,33 @@ impl World {
     }
 
     /// The colour image of a camera mounted at `mount` on the first, which sets the exposure of both: blur, gain, development.
-    fn expose(&self, rays: &RayTable, picture: &Picture, time: f64, mount: &Isometry3<f64>, seed: u64) -> RgbImage {
+    fn expose(&self, rays: &RayTable, rendering: &Rendering, time: f64, mount: &Isometry3<f64>, seed: u64) -> RgbImage {
         let (sensor, (width, height)) = (&self.config.sensor, (rays.width, rays.height));
         let gain = self.config.light.exposure * self.meter.gain(time, |at| self.brightness(at));
         let smeared = (sensor.exposure_s > 0.0).then(|| {
             let [open, close] = [-0.5, 0.5].map(|part| self.path.pose(time + part * sensor.exposure_s) * mount);
-            sensor::blur::smear(&picture.color, &picture.depth, rays, &CameraMove::between(&open, &close))
+            sensor::blur::smear(&rendering.color, &rendering.depth, rays, &CameraMove::between(&open, &close))
         });
-        let linear = smeared.as_ref().unwrap_or(&picture.color);
+        let linear = smeared.as_ref().unwrap_or(&rendering.color);
         sensor::color::develop(linear, width, height, gain, sensor.color_noise, seed)
     }
 
     /// The depth image, which may show the world a little later than the colour image.
-    fn measure(&self, picture: &Picture, time: f64, seed: u64) -> DepthImage {
+    fn measure(&self, rendering: &Rendering, time: f64, seed: u64) -> DepthImage {
         let (camera, sensor) = (&self.config.camera, &self.config.sensor);
         let later = (sensor.depth_offset_s != 0.0).then(|| {
             let time = time + sensor.depth_offset_s;
             self.render(&self.rays, time, &self.path.pose(time))
         });
-        sensor::depth::measure(later.as_ref().unwrap_or(picture), &self.rays, camera, sensor, seed)
+        sensor::depth::measure(later.as_ref().unwrap_or(rendering), &self.rays, camera, sensor, seed)
     }
 
     /// Mean brightness of the picture, as automatic exposure meters it.
     fn brightness(&self, time: f64) -> f32 {
-        let picture = self.render(&self.small_rays, time, &self.path.pose(time));
+        let rendering = self.render(&self.small_rays, time, &self.path.pose(time));
         // White clips: a lamp in the picture does not count for more.
-        let sum: f32 = picture.color.iter().map(|rgb| rgb.iter().map(|v| v.min(1.0)).sum::<f32>() / 3.0).sum();
-        sum / picture.color.len().max(1) as f32
+        let sum: f32 = rendering.color.iter().map(|rgb| rgb.iter().map(|v| v.min(1.0)).sum::<f32>() / 3.0).sum();
+        sum / rendering.color.len().max(1) as f32
     }
 
     fn in_camera(&self, occluders: &[Occluder], t_cam_world: &Isometry3<f64>) -> Vec<Occluder> {
@@ -256,7 +256,7 @@ impl World {
             // Summed in order: a parallel sum would depend on the threads.
             shares.collect::<Vec<f64>>().iter().sum::<f64>() / count as f64
         };
-        if !self.actors.anyone_walks() {
+        if !self.actors.has_walkers() {
             self.person_share = share(&self.actors);
             return;
         }

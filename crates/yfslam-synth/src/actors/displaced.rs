@@ -24,14 +24,14 @@ const STEPS: usize = 1000;
 
 /// The box's places.
 #[derive(Clone, Debug)]
-pub struct Displaced {
+pub struct DisplacedBox {
     from: Isometry3<f32>,
     to: Isometry3<f32>,
     /// When it is displaced, s.
     at: Option<f64>,
 }
 
-impl Displaced {
+impl DisplacedBox {
     /// Chooses the place with the longest moment out of view.
     pub fn new(scene: &Scene, config: &WorldConfig, path: &CameraPath) -> Self {
         let mut rng = Rng::new(config.seed, 0xd15);

@@ -4,14 +4,14 @@
 //! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried object, displaced box. What
 //! nobody can move (desks, the chairs of the scene) is no actor.
 
-pub mod companion;
 pub mod displaced;
 pub mod people;
-pub mod rounds;
+mod rigid_actor;
+pub mod routes;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may")]
 mod tests;
-mod thing;
+pub mod tour_walker;
 pub mod walkway;
 
 use yfslam::Camera;
@@ -21,13 +21,13 @@ use crate::config::{Activity, CarriedObject, WorldConfig};
 use crate::light::{Lights, Occluder};
 use crate::mesh::{Mesh, Vec3};
 use crate::scene::Scene;
-use displaced::Displaced;
+use displaced::DisplacedBox;
 use people::body::Body;
 use people::skeleton::BonePoses;
 use people::tasks::{self, Task};
 use people::{Person, Plan, upright};
-use rounds::{Way, way};
-use thing::Thing;
+use rigid_actor::RigidActor;
+use routes::{Route, route};
 
 /// Names of the classes of actors, by the class of a [`SynthFrame`](crate::SynthFrame)'s boxes and detections.
 pub const CLASS_NAMES: [&str; 5] = ["person", "robot", "chair", "box", "laptop"];
@@ -45,17 +45,17 @@ pub enum Class {
 /// Where a thing is.
 #[derive(Clone, Debug)]
 enum Motion {
-    Drives(Way),
+    Drives(Route),
     /// Pushed or carried by the person of this index.
     Handled(usize),
-    Displaced(Displaced),
+    Displaced(DisplacedBox),
 }
 
 /// Everyone and everything that moves in a scene.
 #[derive(Clone, Debug)]
 pub struct Actors {
     people: Vec<Person>,
-    things: Vec<(Thing, Motion)>,
+    rigid_actors: Vec<(RigidActor, Motion)>,
 }
 
 impl Actors {
@@ -65,47 +65,52 @@ impl Actors {
             (0..config.people).map(|k| Body::new(k as u8 + 1, &mut scene.palette, config.seed)).collect();
         let person = |(k, body)| Person::new(body, plan(scene, config, path, k), config.seed, k);
         let people: Vec<Person> = bodies.into_iter().enumerate().map(person).collect();
-        let mut actors = Self { people, things: Vec::new() };
+        let mut actors = Self { people, rigid_actors: Vec::new() };
         let wanted = &config.actors;
         for robot in 0..wanted.robots {
-            let way = way(scene, config, path, config.people + robot, 0.5);
-            actors.add(Motion::Drives(way), |instance| Thing::robot(instance, &mut scene.palette, config.seed));
+            let route = route(scene, config, path, config.people + robot, 0.5);
+            actors.add(Motion::Drives(route), |instance| RigidActor::robot(instance, &mut scene.palette, config.seed));
         }
-        if let Some(pusher) = rounds::pusher(config) {
-            actors.add(Motion::Handled(pusher), |instance| Thing::chair(instance, &mut scene.palette, config.seed));
+        if let Some(pusher) = routes::pusher(config) {
+            actors
+                .add(Motion::Handled(pusher), |instance| RigidActor::chair(instance, &mut scene.palette, config.seed));
         }
-        if let Some(carrier) = rounds::carrier(config) {
+        if let Some(carrier) = routes::carrier(config) {
             actors.add(Motion::Handled(carrier), |instance| match wanted.carried_object {
-                CarriedObject::Box => Thing::cardboard(instance, &mut scene.palette, tasks::BOX_M.into(), config.seed),
+                CarriedObject::Box => {
+                    RigidActor::cardboard(instance, &mut scene.palette, tasks::BOX_M.into(), config.seed)
+                }
                 CarriedObject::Laptop => {
-                    Thing::laptop(instance, &mut scene.palette, tasks::LAPTOP_M.into(), config.seed)
+                    RigidActor::laptop(instance, &mut scene.palette, tasks::LAPTOP_M.into(), config.seed)
                 }
             });
         }
         if wanted.moved_object {
-            let way = Displaced::new(scene, config, path);
-            actors.add(Motion::Displaced(way), |instance| {
-                Thing::cardboard(instance, &mut scene.palette, displaced::BOX_M.into(), config.seed ^ 0xb)
+            let displaced = DisplacedBox::new(scene, config, path);
+            actors.add(Motion::Displaced(displaced), |instance| {
+                RigidActor::cardboard(instance, &mut scene.palette, displaced::BOX_M.into(), config.seed ^ 0xb)
             });
         }
         actors
     }
 
-    fn add(&mut self, motion: Motion, thing: impl FnOnce(u8) -> Thing) {
-        let instance = (self.people.len() + self.things.len() + 1) as u8;
-        self.things.push((thing(instance), motion));
+    fn add(&mut self, motion: Motion, rigid_actor: impl FnOnce(u8) -> RigidActor) {
+        let instance = (self.people.len() + self.rigid_actors.len() + 1) as u8;
+        self.rigid_actors.push((rigid_actor(instance), motion));
     }
 
     /// Number of actors.
     pub fn len(&self) -> usize {
-        self.people.len() + self.things.len()
+        self.people.len() + self.rigid_actors.len()
     }
 
     /// What actor number `instance` (from 1) is.
     pub fn class(&self, instance: u8) -> Class {
         let index = usize::from(instance).saturating_sub(1);
         match index.checked_sub(self.people.len()) {
-            Some(thing) => self.things.get(thing).map_or(Class::Box, |(thing, _)| thing.class),
+            Some(rigid_actor) => {
+                self.rigid_actors.get(rigid_actor).map_or(Class::Box, |(rigid_actor, _)| rigid_actor.class)
+            }
             None => Class::Person,
         }
     }
@@ -114,22 +119,22 @@ impl Actors {
     /// come by.
     pub fn set_closeness(&mut self, scene: &Scene, config: &WorldConfig, path: &CameraPath, closeness: f64) {
         let walkers = self.people.iter_mut().enumerate().filter_map(|(k, person)| match &mut person.plan {
-            Plan::Walk(way, _) => Some((k, way)),
+            Plan::Walk(route, _) => Some((k, route)),
             _ => None,
         });
-        let drivers = self.things.iter_mut().filter_map(|(_, motion)| match motion {
-            Motion::Drives(way) => Some(way),
+        let drivers = self.rigid_actors.iter_mut().filter_map(|(_, motion)| match motion {
+            Motion::Drives(route) => Some(route),
             _ => None,
         });
-        for (k, old) in walkers.chain(drivers.enumerate().map(|(k, way)| (config.people + k, way))) {
-            *old = way(scene, config, path, k, closeness);
+        for (k, old) in walkers.chain(drivers.enumerate().map(|(k, route)| (config.people + k, route))) {
+            *old = route(scene, config, path, k, closeness);
         }
     }
 
     /// Whether anyone goes round.
-    pub fn anyone_walks(&self) -> bool {
+    pub fn has_walkers(&self) -> bool {
         self.people.iter().any(|person| matches!(person.plan, Plan::Walk(..)))
-            || self.things.iter().any(|(_, motion)| matches!(motion, Motion::Drives(_)))
+            || self.rigid_actors.iter().any(|(_, motion)| matches!(motion, Motion::Drives(_)))
     }
 
     /// Everyone's mesh and occluders at `time` seconds, in world coordinates.
@@ -140,21 +145,23 @@ impl Actors {
             person.body.pose(poses, lights, &mut mesh);
             occluders.extend(person.occluders(poses));
         }
-        for (thing, motion) in &self.things {
+        for (rigid_actor, motion) in &self.rigid_actors {
             let pose = match motion {
-                Motion::Drives(way) => {
-                    let step = way.at(time);
+                Motion::Drives(route) => {
+                    let step = route.at(time);
                     upright(step.position.map(|v| v as f32), 0.0, (step.heading + step.glance) as f32)
                 }
                 Motion::Handled(by) => match &self.people[*by].plan {
-                    Plan::Walk(way, Task::Carry(object)) => tasks::carried(*object, way, &way.at(time), &poses[*by]),
-                    Plan::Walk(way, _) => tasks::chair(&way.at(time)),
+                    Plan::Walk(route, Task::Carry(object)) => {
+                        tasks::carried(*object, route, &route.at(time), &poses[*by])
+                    }
+                    Plan::Walk(route, _) => tasks::chair(&route.at(time)),
                     _ => continue,
                 },
-                Motion::Displaced(way) => way.at(time),
+                Motion::Displaced(displaced) => displaced.at(time),
             };
-            thing.pose(&pose, lights, &mut mesh);
-            occluders.extend(thing.occluders(&pose));
+            rigid_actor.pose(&pose, lights, &mut mesh);
+            occluders.extend(rigid_actor.occluders(&pose));
         }
         (mesh, occluders)
     }
@@ -164,11 +171,11 @@ impl Actors {
 fn plan(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize) -> Plan {
     let walk = || {
         let task = match k {
-            _ if rounds::pusher(config) == Some(k) => Task::Push,
-            _ if rounds::carrier(config) == Some(k) => Task::Carry(config.actors.carried_object),
+            _ if routes::pusher(config) == Some(k) => Task::Push,
+            _ if routes::carrier(config) == Some(k) => Task::Carry(config.actors.carried_object),
             _ => Task::Nothing,
         };
-        Plan::Walk(way(scene, config, path, k, 0.5), task)
+        Plan::Walk(route(scene, config, path, k, 0.5), task)
     };
     let seats = scene.seats.len();
     match config.activity {

@@ -26,7 +26,7 @@ const LID_LEANS: f32 = 0.35;
 
 /// A rigid actor.
 #[derive(Clone, Debug)]
-pub struct Thing {
+pub struct RigidActor {
     /// What it is.
     pub class: Class,
     mesh: Mesh,
@@ -34,7 +34,7 @@ pub struct Thing {
     spheres: Vec<Occluder>,
 }
 
-impl Thing {
+impl RigidActor {
     /// A robot on two tracks, 0.75 m long and 1.2 m high, with a mast, a camera head, an arm and a beacon.
     pub fn robot(instance: u8, palette: &mut Palette, seed: u64) -> Self {
         let spheres = [(0.2, 0.2), (-0.2, 0.2)].map(|(y, radius)| ball(0.0, y, 0.18, radius));
@@ -172,20 +172,20 @@ fn track(b: &mut Builder, x: f32, length: f32, height: f32, width: f32) {
     let perimeter = 2.0 * straight + TAU * radius;
     // Outline at share u of the perimeter, from the front of the upper straight, backwards: (forward, up) and normal.
     let outline = move |u: f32| -> ([f32; 2], [f32; 2]) {
-        let way = u * perimeter;
+        let route = u * perimeter;
         let arc = PI * radius;
         let wheel = |middle: f32, angle: f32| {
             let (sin, cos) = angle.sin_cos();
             ([middle + radius * cos, radius + radius * sin], [cos, sin])
         };
-        if way < straight {
-            ([straight / 2.0 - way, 2.0 * radius], [0.0, 1.0])
-        } else if way < straight + arc {
-            wheel(-straight / 2.0, FRAC_PI_2 + (way - straight) / radius)
-        } else if way < 2.0 * straight + arc {
-            ([-straight / 2.0 + way - straight - arc, 0.0], [0.0, -1.0])
+        if route < straight {
+            ([straight / 2.0 - route, 2.0 * radius], [0.0, 1.0])
+        } else if route < straight + arc {
+            wheel(-straight / 2.0, FRAC_PI_2 + (route - straight) / radius)
+        } else if route < 2.0 * straight + arc {
+            ([-straight / 2.0 + route - straight - arc, 0.0], [0.0, -1.0])
         } else {
-            wheel(straight / 2.0, -FRAC_PI_2 + (way - 2.0 * straight - arc) / radius)
+            wheel(straight / 2.0, -FRAC_PI_2 + (route - 2.0 * straight - arc) / radius)
         }
     };
     let belt = b.patch(Material::Shirt(RUBBER, [0.26, 0.26, 0.27], Pattern::Stripes), [width, perimeter]);

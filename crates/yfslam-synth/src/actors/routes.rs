@@ -7,8 +7,8 @@
 //! Where a camera that goes on a tour would run into them, or see none of them, people walk that tour themselves: ahead of the
 //! camera, and where there is room, as in a corridor, every second one towards it and past it.
 
-use super::companion::{Companion, Manner};
 use super::people::tasks::HANDLING_S;
+use super::tour_walker::{Manner, TourWalker};
 use super::walkway::{Step, Stop, Walkway};
 use crate::camera_path::{CameraPath, WALK};
 use crate::config::{Activity, WorldConfig};
@@ -41,19 +41,19 @@ const TOWARDS: f64 = 0.8;
 
 /// The way of someone who goes round.
 #[derive(Clone, Debug)]
-pub enum Way {
+pub enum Route {
     /// Around the furniture.
     Around(Walkway),
     /// Along the camera's tour.
-    Along(Companion),
+    Along(TourWalker),
 }
 
-impl Way {
+impl Route {
     /// Where the walker is at `time` seconds.
     pub fn at(&self, time: f64) -> Step {
         match self {
-            Self::Around(way) => way.at(time),
-            Self::Along(way) => way.at(time),
+            Self::Around(route) => route.at(time),
+            Self::Along(route) => route.at(time),
         }
     }
 }
@@ -77,17 +77,19 @@ fn lane_of(k: usize) -> usize {
 }
 
 /// The way of number `k` of those who go round, for a closeness up to 2.
-pub fn way(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize, closeness: f64) -> Way {
+pub fn route(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize, closeness: f64) -> Route {
     match (path.tour(), scene.company) {
-        (Some(tour), Company::Ahead) => Way::Along(ahead(config, tour, k, closeness)),
-        (Some(tour), Company::BothWays(_)) if k.is_multiple_of(2) => Way::Along(ahead(config, tour, k / 2, closeness)),
-        (Some(tour), Company::BothWays(lane_m)) => Way::Along(towards(scene, config, tour, lane_m, k)),
-        _ => Way::Around(round(scene, config, k, closeness)),
+        (Some(tour), Company::Ahead) => Route::Along(ahead(config, tour, k, closeness)),
+        (Some(tour), Company::BothWays(_)) if k.is_multiple_of(2) => {
+            Route::Along(ahead(config, tour, k / 2, closeness))
+        }
+        (Some(tour), Company::BothWays(lane_m)) => Route::Along(towards(scene, config, tour, lane_m, k)),
+        _ => Route::Around(circuit(scene, config, k, closeness)),
     }
 }
 
 /// Number `place` of those ahead of the camera on its tour, the less far the closer.
-fn ahead(config: &WorldConfig, tour: &Tour, place: usize, closeness: f64) -> Companion {
+fn ahead(config: &WorldConfig, tour: &Tour, place: usize, closeness: f64) -> TourWalker {
     let mut draw = Rng::new(config.seed, 0xc0a1);
     let [far, near] = LEAD_M.map(f64::ln);
     let lead_m = (far + (near - far) * closeness / 2.0).exp();
@@ -95,25 +97,25 @@ fn ahead(config: &WorldConfig, tour: &Tour, place: usize, closeness: f64) -> Com
     // All waver alike, and so never run into each other.
     let waver = [WAVER * lead_m / pace, WAVER_RATE, draw.range64(0.0, std::f64::consts::TAU)];
     let start_s = (lead_m + APART_M * place as f64) / pace;
-    Companion::new(tour.clone(), Manner { start_s, rate: 1.0, beside_m: -LEFT_M, waver })
+    TourWalker::new(tour.clone(), Manner { start_s, rate: 1.0, beside_m: -LEFT_M, waver })
 }
 
 /// Number `k` of all, who comes towards the camera in the lane beside its tour.
-fn towards(scene: &Scene, config: &WorldConfig, tour: &Tour, lane_m: f64, k: usize) -> Companion {
+fn towards(scene: &Scene, config: &WorldConfig, tour: &Tour, lane_m: f64, k: usize) -> TourWalker {
     let seconds = config.frames as f64 / config.camera.fps;
     // Beside a tour with narrow bends nobody could walk: this lane has wide ones.
-    let lane = Tour::new(&scene.round, WALK, tour.period());
+    let lane = Tour::new(&scene.circuit, WALK, tour.period());
     let early = Rng::new(config.seed, 0x1a7e).range64(0.3, 0.6) * seconds.min(12.0);
     let of_these = ((walkers(scene, config) + config.actors.robots) / 2).max(1);
     let behind_s = (k / 2) as f64 / of_these as f64 * lane.period();
     let start_s = lane.time_near(tour.place(early)) + TOWARDS * early + behind_s;
     let manner = Manner { start_s, rate: -TOWARDS, beside_m: lane_m, waver: [0.0; 3] };
-    Companion::new(lane, manner)
+    TourWalker::new(lane, manner)
 }
 
 /// The round of number `k` of those who go round, for a closeness up to 2: strolls the slower past the camera, and waits the
 /// shorter out of its sight, the closer; beyond 1 they come nearer, too, stop before it and face it.
-fn round(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> Walkway {
+fn circuit(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> Walkway {
     let going = walkers(scene, config) + config.actors.robots;
     let in_lane = (0..going).filter(|&other| lane_of(other) == lane_of(k)).count().max(1);
     let [own, model] = [k, 1].map(|number| lane(scene, config, number, closeness));

@@ -10,7 +10,7 @@ use crate::tour::Tour;
 
 /// Someone on a round.
 #[derive(Clone, Debug)]
-pub struct Companion {
+pub struct TourWalker {
     tour: Tour,
     manner: Manner,
     /// Length of the parallel curve from the start of the round, every [`SAMPLE_S`] of its time-table, for one round; m.
@@ -33,7 +33,7 @@ pub struct Manner {
 /// Step of the table of lengths, s.
 const SAMPLE_S: f64 = 0.05;
 
-impl Companion {
+impl TourWalker {
     /// Someone who walks `tour` in the given way.
     pub fn new(tour: Tour, manner: Manner) -> Self {
         let samples = (tour.period() / SAMPLE_S).ceil() as usize;
@@ -93,7 +93,7 @@ mod tests {
         let tour = Tour::new(&[[0.0, 0.0], [0.0, 6.0], [10.0, 6.0], [10.0, -4.0], [0.0, -4.0]], WALK, 40.0);
         for (rate, beside_m) in [(1.0, -0.2), (-0.8, 0.7)] {
             let manner = Manner { start_s: 3.0, rate, beside_m, waver: [0.3, 0.5, 1.0] };
-            let companion = Companion::new(tour.clone(), manner);
+            let companion = TourWalker::new(tour.clone(), manner);
             let dt = 0.02;
             let steps: Vec<Step> = (0..5000).map(|i| companion.at(f64::from(i) * dt)).collect();
             for pair in steps.windows(2) {

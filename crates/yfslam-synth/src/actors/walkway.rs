@@ -209,8 +209,8 @@ fn profile(t: f64) -> (f64, f64) {
     } else if t <= 1.0 - RAMP {
         (top * (t - RAMP / 2.0), top)
     } else {
-        let (way, speed) = rising(1.0 - t);
-        (1.0 - way, speed)
+        let (route, speed) = rising(1.0 - t);
+        (1.0 - route, speed)
     }
 }
 
@@ -231,9 +231,10 @@ mod tests {
 
     #[test]
     fn a_walker_moves_without_jumps_at_the_stated_speed_and_stops() {
-        let round = [[2.0, 0.0], [0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]];
+        let waypoints = [[2.0, 0.0], [0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]];
         let stop = |near| Stop { near, pause: 1.5, glance: 0.8, pace: 0.9 };
-        let walkway = Walkway::new(&round, &[stop([0.0, 2.0]), stop([-2.0, 0.1])], true).meeting([0.0, 2.0], 3.0, 0.0);
+        let walkway =
+            Walkway::new(&waypoints, &[stop([0.0, 2.0]), stop([-2.0, 0.1])], true).meeting([0.0, 2.0], 3.0, 0.0);
         let met = walkway.at(3.0);
         assert!(distance(met.position, [0.0, 2.0]) < 0.1 && met.speed < 1e-9, "{met:?}");
         let h = 0.01;
@@ -245,7 +246,7 @@ mod tests {
         for (pair, speed) in steps.windows(2).zip(&speeds) {
             assert!((pair[0].speed - speed).abs() < 0.05, "{} is not {speed}", pair[0].speed);
             let walked = (pair[1].distance - pair[0].distance) / h;
-            assert!((walked - speed).abs() < 0.01, "the way counts {walked} m/s instead of {speed}");
+            assert!((walked - speed).abs() < 0.01, "the route counts {walked} m/s instead of {speed}");
             let turn = (pair[1].heading + pair[1].glance - pair[0].heading - pair[0].glance).sin().abs();
             assert!(turn < 0.06, "turns by {turn} rad in {h} s");
         }

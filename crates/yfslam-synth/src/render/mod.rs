@@ -22,7 +22,7 @@ use crate::mesh::Mesh;
 
 /// What the renderer makes of one view; row-major, `width * height` pixels.
 #[derive(Clone, Debug, Default)]
-pub struct Picture {
+pub struct Rendering {
     /// Linear RGB, 1 is white.
     pub color: Vec<[f32; 3]>,
     /// Depth along the optical axis in metres; 0 where nothing is seen.
@@ -33,7 +33,7 @@ pub struct Picture {
     pub reflectance: Vec<f32>,
 }
 
-impl Picture {
+impl Rendering {
     fn new(pixels: usize) -> Self {
         Self {
             color: vec![[0.0; 3]; pixels],
@@ -45,29 +45,29 @@ impl Picture {
 }
 
 /// Renders the meshes of `view` from `t_cam_world`.
-pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antialias: bool) -> Picture {
+pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antialias: bool) -> Rendering {
     let triangles = project_all(rays, t_cam_world, view);
     let mut seen = Visibility::empty(rays);
     seen.add(rays, &triangles);
     view.prepare(&triangles, &seen.triangle);
     let painter = Painter { rays, view, triangles: &triangles, seen: &seen, antialias };
-    let bands: Vec<Picture> = (0..rays.bands.len())
+    let bands: Vec<Rendering> = (0..rays.bands.len())
         .into_par_iter()
         .map(|band| {
             let rows = TILE.min(rays.height - band * TILE);
-            let mut out = Picture::new(rows * rays.width);
+            let mut out = Rendering::new(rows * rays.width);
             painter.band(band, &mut out);
             out
         })
         .collect();
-    let mut picture = Picture::new(0);
+    let mut rendering = Rendering::new(0);
     for band in bands {
-        picture.color.extend(band.color);
-        picture.depth.extend(band.depth);
-        picture.instance.extend(band.instance);
-        picture.reflectance.extend(band.reflectance);
+        rendering.color.extend(band.color);
+        rendering.depth.extend(band.depth);
+        rendering.instance.extend(band.instance);
+        rendering.reflectance.extend(band.reflectance);
     }
-    picture
+    rendering
 }
 
 fn project_all(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View) -> Vec<Projected> {

@@ -2,7 +2,7 @@
 //!
 //! In: what each pixel sees. Out: linear RGB, depth and instance per pixel.
 
-use super::Picture;
+use super::Rendering;
 use super::project::Projected;
 use super::raster::{NOTHING, Visibility};
 use super::rays::{RayTable, TILE};
@@ -34,7 +34,7 @@ type Candidates = ([u32; 9], usize);
 
 impl Painter<'_> {
     /// Paints the band of tiles number `band` into `out`, which holds the band's rows.
-    pub fn band(&self, band: usize, out: &mut Picture) {
+    pub fn band(&self, band: usize, out: &mut Rendering) {
         let (width, rows) = (self.rays.width, out.depth.len() / self.rays.width);
         let mut near = Vec::new();
         for column in (0..width).step_by(TILE) {

@@ -63,7 +63,7 @@ pub fn build(seed: u64) -> Scene {
         walk_half_width: 0.65,
         walk_far_y: 2.2,
         walk_near_y: [-2.65, -2.3],
-        round: vec![
+        circuit: vec![
             [west, -2.0],
             [west, my.into()],
             [mx.into(), my.into()],
@@ -120,27 +120,27 @@ fn inner_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
         match (bay + corridor) % 4 {
             0 => {
                 b.density = 450.0;
-                wall.hang(b, [paper, 2.05], [0.6, 0.84], Material::Poster);
+                wall.attach(b, [paper, 2.05], [0.6, 0.84], Material::Poster);
             }
             1 => {
                 b.density = 420.0;
-                wall.hang(b, [paper - 0.05, 2.0], [0.95, 0.7], Material::NoticeBoard);
+                wall.attach(b, [paper - 0.05, 2.0], [0.95, 0.7], Material::NoticeBoard);
             }
             2 => {
                 b.density = 700.0;
-                wall.hang(b, [paper, 1.75], [0.21, 0.297], Material::Paper);
-                wall.hang(b, [paper + 0.35, 1.80], [0.297, 0.42], Material::Poster);
+                wall.attach(b, [paper, 1.75], [0.21, 0.297], Material::Paper);
+                wall.attach(b, [paper + 0.35, 1.80], [0.297, 0.42], Material::Poster);
                 extinguisher(b, wall, paper + 0.75);
             }
             _ => {
                 b.density = 450.0;
-                wall.hang(b, [paper, 1.95], [0.84, 0.6], Material::Poster);
+                wall.attach(b, [paper, 1.95], [0.84, 0.6], Material::Poster);
             }
         }
         if bay % 2 == corridor % 2 {
             b.density = 600.0;
             let color = b.rng.pick([[0.10, 0.46, 0.28], [0.16, 0.36, 0.62], [0.62, 0.14, 0.13]]);
-            wall.hang(b, [s + 0.55, 2.42], [0.40, 0.20], Material::Sign(color));
+            wall.attach(b, [s + 0.55, 2.42], [0.40, 0.20], Material::Sign(color));
         }
     }
 }
@@ -174,20 +174,20 @@ fn outer_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
             }
             1 => {
                 b.density = 420.0;
-                wall.hang(b, [s + 0.4, 2.15], [1.5, 0.85], Material::NoticeBoard);
+                wall.attach(b, [s + 0.4, 2.15], [1.5, 0.85], Material::NoticeBoard);
             }
             2 => {
                 b.density = 420.0;
                 for (left, top, w, h) in [(0.3, 2.2, 0.6, 0.84), (1.1, 2.1, 0.9, 0.65)] {
                     let jitter = b.rng.range(-0.08, 0.08);
-                    wall.hang(b, [s + left + jitter, top + jitter], [w, h], Material::Poster);
+                    wall.attach(b, [s + left + jitter, top + jitter], [w, h], Material::Poster);
                 }
             }
             _ => {
                 b.density = 350.0;
                 wall.door(b, s + 0.7, [0.98, 2.06], [0.42, 0.48, 0.55]);
                 b.density = 600.0;
-                wall.hang(b, [s + 1.9, 1.9], [0.42, 0.6], Material::Poster);
+                wall.attach(b, [s + 1.9, 1.9], [0.42, 0.6], Material::Poster);
             }
         }
     }
@@ -213,19 +213,19 @@ fn corner_prints(b: &mut Builder, wall: &Wall, corridor: usize) {
     ];
     for (s, z, w, h, material) in prints {
         let jitter = b.rng.range(-0.06, 0.06);
-        wall.hang(b, [s + jitter, z + jitter], [w, h], material);
+        wall.attach(b, [s + jitter, z + jitter], [w, h], material);
     }
     b.density = 600.0;
-    wall.hang(b, [end - 1.45, 2.45], [0.50, 0.22], Material::Sign([0.10, 0.46, 0.28]));
-    wall.hang(b, [1.25, 0.35], [0.16, 0.08], Material::Socket);
-    wall.hang(b, [end - 1.3, 0.35], [0.16, 0.08], Material::Socket);
+    wall.attach(b, [end - 1.45, 2.45], [0.50, 0.22], Material::Sign([0.10, 0.46, 0.28]));
+    wall.attach(b, [1.25, 0.35], [0.16, 0.08], Material::Socket);
+    wall.attach(b, [end - 1.3, 0.35], [0.16, 0.08], Material::Socket);
 }
 
 fn extinguisher(b: &mut Builder, wall: &Wall, s: f32) {
     b.density = 500.0;
     let rings = [[0.52, 0.0], [0.52, 0.03], [0.44, 0.035], [0.40, 0.08], [0.0, 0.08]];
     b.turned(wall.at(s, 0.25, 0.10), &rings, 14, Material::Rusty([0.72, 0.12, 0.10]));
-    wall.hang(b, [s - 0.1, 1.45], [0.2, 0.2], Material::Sign([0.70, 0.13, 0.11]));
+    wall.attach(b, [s - 0.1, 1.45], [0.2, 0.2], Material::Sign([0.70, 0.13, 0.11]));
 }
 
 /// What stands in the outer corners: something different in each.

@@ -55,7 +55,7 @@ pub struct Scene {
     /// Range of y for the near side of the walk: closest to the camera first, m.
     pub walk_near_y: [f64; 2],
     /// Corners of a closed round on the floor along which a camera can be carried or driven, the first on a straight, m.
-    pub round: Vec<[f64; 2]>,
+    pub circuit: Vec<[f64; 2]>,
     /// Where people walk while the camera is on that round.
     pub company: Company,
     /// Where people can sit.

@@ -43,7 +43,7 @@ pub fn build(seed: u64) -> Scene {
         walk_near_y: [-1.1, -0.75],
         company: Company::Apart,
         seats,
-        round: vec![[0.0, -1.2], [-2.05, -1.0], [-2.05, 2.3], [2.1, 2.3], [2.1, -1.0]],
+        circuit: vec![[0.0, -1.2], [-2.05, -1.0], [-2.05, 2.3], [2.1, 2.3], [2.1, -1.0]],
         stands: vec![stand(-1.75, 0.6, -2.0), stand(1.8, 0.7, 2.2), stand(-0.5, 2.1, PI), stand(0.7, 2.2, -2.6)],
     }
 }

@@ -74,7 +74,7 @@ impl Wall {
     }
 
     /// Something flat on the wall: its left edge at `s`, its top at `z`.
-    pub fn hang(&self, b: &mut Builder, [s, z]: [f32; 2], [width, height]: [f32; 2], material: Material) {
+    pub fn attach(&self, b: &mut Builder, [s, z]: [f32; 2], [width, height]: [f32; 2], material: Material) {
         b.rectangle(self.at(s, z, PROUD_M), self.right * width, -Vec3::z() * height, material);
     }
 

@@ -9,12 +9,12 @@ use yfslam::Camera;
 use yfslam::image::{DepthImage, Image};
 
 use crate::config::SensorConfig;
-use crate::render::Picture;
+use crate::render::Rendering;
 use crate::render::rays::RayTable;
 use crate::rng::{hash, normals4};
 
 /// Measures the exact depth of a picture.
-pub fn measure(exact: &Picture, rays: &RayTable, camera: &Camera, sensor: &SensorConfig, seed: u64) -> DepthImage {
+pub fn measure(exact: &Rendering, rays: &RayTable, camera: &Camera, sensor: &SensorConfig, seed: u64) -> DepthImage {
     let (width, bf) = (camera.width, camera.bf as f32);
     let least_cosine = sensor.max_angle_deg.to_radians().cos();
     let by_angle = sensor.max_angle_deg < 90.0 || sensor.depth_noise_angle > 0.0 || sensor.min_return > 0.0;
@@ -118,8 +118,8 @@ mod tests {
     /// Measures surfaces of this depth and reflectance.
     fn measured(exact: Vec<f32>, reflectance: f32, sensor: &SensorConfig) -> DepthImage {
         let pixels = exact.len();
-        let picture = Picture { depth: exact, reflectance: vec![reflectance; pixels], ..Picture::default() };
-        measure(&picture, &RayTable::new(&camera()), &camera(), sensor, 1)
+        let rendering = Rendering { depth: exact, reflectance: vec![reflectance; pixels], ..Rendering::default() };
+        measure(&rendering, &RayTable::new(&camera()), &camera(), sensor, 1)
     }
 
     fn missing(image: &DepthImage) -> f64 {
@@ -136,9 +136,9 @@ mod tests {
         let long = Camera { fx: 20_000.0, fy: 20_000.0, cx: 100.0, cy: 50.0, ..camera() };
         let lost = |degrees: f32| {
             let depth = wall(degrees);
-            let picture = Picture { reflectance: vec![0.5; depth.len()], depth, ..Picture::default() };
+            let rendering = Rendering { reflectance: vec![0.5; depth.len()], depth, ..Rendering::default() };
             let sensor = SensorConfig { max_angle_deg: 80.0, ..SensorConfig::perfect() };
-            missing(&measure(&picture, &RayTable::new(&long), &long, &sensor, 1))
+            missing(&measure(&rendering, &RayTable::new(&long), &long, &sensor, 1))
         };
         assert_eq!((lost(0.0), lost(60.0)), (0.0, 0.0));
         assert!((0.2..0.8).contains(&lost(80.0)), "{}", lost(80.0));

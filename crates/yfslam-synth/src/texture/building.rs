@@ -192,7 +192,7 @@ pub(super) fn notice_board(canvas: &mut Canvas, m: f32, seed: u64, rng: &mut Rng
         canvas.rect(x, y, pw, ph, ground);
         print::word(canvas, x + 0.1 * pw, y + 0.07 * ph, 0.6 * pw, tint(print::ink(rng), 0.8), rng);
         if rng.chance(0.5) {
-            print::picture(canvas, [x + 0.1 * pw, y + 0.25 * ph, 0.8 * pw, 0.35 * ph], rng);
+            print::illustration(canvas, [x + 0.1 * pw, y + 0.25 * ph, 0.8 * pw, 0.35 * ph], rng);
         }
         let text = [x + 0.1 * pw, y + 0.64 * ph, 0.8 * pw, 0.3 * ph];
         print::paragraph(canvas, text, 0.011 / m, tint(BLACK, 2.0), rng);

@@ -52,7 +52,7 @@ pub(super) fn paragraph(canvas: &mut Canvas, area: [f32; 4], line: f32, color: C
 }
 
 /// A picture within an area: mosaic, landscape, chart, rings or a network.
-pub(super) fn picture(canvas: &mut Canvas, area: [f32; 4], rng: &mut Rng) {
+pub(super) fn illustration(canvas: &mut Canvas, area: [f32; 4], rng: &mut Rng) {
     let [x, y, w, h] = area;
     let seed = rng.bits();
     let (a, b, c) = (ink(rng), ink(rng), ink(rng));
@@ -134,7 +134,7 @@ pub(super) fn poster(canvas: &mut Canvas, rng: &mut Rng) {
             let height = rng.range(0.16, 0.30) * h;
             let height = height.min(0.97 * h - y);
             if with_picture {
-                picture(canvas, [x, y, inner, height], rng);
+                illustration(canvas, [x, y, inner, height], rng);
             } else {
                 canvas.rect(x, y, inner * 0.6, 0.018 * h, head);
                 paragraph(canvas, [x, y + 0.03 * h, inner, height - 0.03 * h], 0.016 * h, text, rng);
@@ -158,7 +158,7 @@ pub(super) fn paper(canvas: &mut Canvas, m: f32, rng: &mut Rng) {
     canvas.rect(margin, margin, 0.5 * w, 0.010 / m, BLACK);
     let line = 0.009 / m;
     paragraph(canvas, [margin, margin + 0.025 / m, w - 2.0 * margin, h * 0.45], line, tint(BLACK, 2.2), rng);
-    picture(canvas, [margin, 0.64 * h, w - 2.0 * margin, 0.27 * h], rng);
+    illustration(canvas, [margin, 0.64 * h, w - 2.0 * margin, 0.27 * h], rng);
 }
 
 pub(super) fn cover(canvas: &mut Canvas, color: Color, rng: &mut Rng) {
@@ -166,7 +166,7 @@ pub(super) fn cover(canvas: &mut Canvas, color: Color, rng: &mut Rng) {
     canvas.fill(color);
     word(canvas, 0.1 * w, 0.1 * h, 0.8 * w, WHITE, rng);
     word(canvas, 0.1 * w, 0.3 * h, 0.5 * w, tint(WHITE, 0.8), rng);
-    picture(canvas, [0.15 * w, 0.45 * h, 0.7 * w, 0.42 * h], rng);
+    illustration(canvas, [0.15 * w, 0.45 * h, 0.7 * w, 0.42 * h], rng);
 }
 
 pub(super) fn spine(canvas: &mut Canvas, color: Color, rng: &mut Rng) {
@@ -217,7 +217,7 @@ pub(super) fn screen(canvas: &mut Canvas, rng: &mut Rng) {
         canvas.rect(x, y, ww, 0.05 * h, tint(ink(rng), 0.8));
         let line = 0.025 * h;
         paragraph(canvas, [x + 0.02 * w, y + 0.08 * h, ww * 0.9, wh * 0.5], line, text, rng);
-        picture(canvas, [x + 0.02 * w, y + 0.1 * h + wh * 0.5, ww * 0.6, wh * 0.3], rng);
+        illustration(canvas, [x + 0.02 * w, y + 0.1 * h + wh * 0.5, ww * 0.6, wh * 0.3], rng);
     }
     canvas.rect(0.0, 0.95 * h, w, 0.05 * h, [0.16, 0.17, 0.2]);
     for icon in 0..7 {

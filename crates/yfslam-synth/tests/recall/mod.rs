@@ -26,7 +26,7 @@ pub fn official_detector() -> Option<YoloFastestV2> {
 
 /// A visible person and the overlap of the detection that found it.
 #[derive(Clone, Copy, Debug)]
-pub struct Sighting {
+pub struct VisiblePerson {
     pub instance: u8,
     pub bbox: BoundingBox,
     /// Distance of the nearest visible pixel, m.
@@ -36,7 +36,7 @@ pub struct Sighting {
     pub found: bool,
 }
 
-impl Sighting {
+impl VisiblePerson {
     /// Under which circumstances the person is seen; one of distance, one of truncation.
     pub fn circumstances(&self, width: f32, height: f32) -> [&'static str; 2] {
         let b = &self.bbox;
@@ -58,7 +58,7 @@ impl Sighting {
 }
 
 /// Everyone tall enough in `shot`, with whether `detections` find them.
-pub fn sightings(shot: &SynthFrame, detections: &[Detection]) -> Vec<Sighting> {
+pub fn visible_people(shot: &SynthFrame, detections: &[Detection]) -> Vec<VisiblePerson> {
     let height = shot.instances.height() as f32;
     let mut pairs = Vec::new();
     let people: Vec<(u8, BoundingBox)> = shot
@@ -83,13 +83,13 @@ pub fn sightings(shot: &SynthFrame, detections: &[Detection]) -> Vec<Sighting> {
         }
     }
     let pixels = || shot.instances.data().iter().zip(shot.exact_depth.data());
-    let sighting = |(&(instance, bbox), found): (&(u8, BoundingBox), bool)| {
+    let visible_person = |(&(instance, bbox), found): (&(u8, BoundingBox), bool)| {
         let own = || pixels().filter(|(k, _)| **k == instance);
         let nearest_m = own().map(|(_, z)| *z).fold(f32::INFINITY, f32::min);
         let filled = own().count() as f32 / bbox.area();
-        Sighting { instance, bbox, nearest_m, filled, found }
+        VisiblePerson { instance, bbox, nearest_m, filled, found }
     };
-    people.iter().zip(found).map(sighting).collect()
+    people.iter().zip(found).map(visible_person).collect()
 }
 
 /// People seen and people found.
@@ -115,20 +115,20 @@ impl Count {
 /// Counts per world and per circumstance.
 pub type Table = BTreeMap<String, Count>;
 
-/// Adds the sightings of every `step`-th frame to `table`; `each` sees every frame.
+/// Adds the visible_people of every `step`-th frame to `table`; `each` sees every frame.
 pub fn measure(
     world: &World,
     name: &str,
     step: usize,
     detector: &mut YoloFastestV2,
     table: &mut Table,
-    mut each: impl FnMut(usize, &SynthFrame, &[Detection], &[Sighting]),
+    mut each: impl FnMut(usize, &SynthFrame, &[Detection], &[VisiblePerson]),
 ) {
     let mut detections = Vec::new();
     for index in (0..world.len()).step_by(step) {
         let shot = world.frame(index);
         detector.detect(&shot.frame.color, &mut detections).unwrap();
-        let seen = sightings(&shot, &detections);
+        let seen = visible_people(&shot, &detections);
         for s in &seen {
             let [distance, cut] = s.circumstances(shot.instances.width() as f32, shot.instances.height() as f32);
             for key in [name, "all", distance, cut] {

@@ -10,7 +10,7 @@ pub mod tasks;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
-use super::rounds::Way;
+use super::routes::Route;
 use crate::light::Occluder;
 use crate::mesh::Vec3;
 use crate::rng::{Rng, hash};
@@ -23,7 +23,7 @@ use tasks::Task;
 #[derive(Clone, Debug)]
 pub enum Plan {
     /// Walks a round, perhaps with something to do on the way.
-    Walk(Way, Task),
+    Walk(Route, Task),
     /// Sits and gestures.
     Sit(Seat),
     /// Sits down and gets up again and again.
@@ -68,15 +68,15 @@ impl Person {
         let p = &self.body.proportions;
         let (seed, t) = (self.seed, time as f32);
         match &self.plan {
-            Plan::Walk(way, task) => {
-                let step = way.at(time);
+            Plan::Walk(route, task) => {
+                let step = route.at(time);
                 let mut joints = gait::walk(p, step.distance as f32, step.speed as f32, seed, t);
-                let turn = task.prepare(way, &step, &mut joints);
+                let turn = task.prepare(route, &step, &mut joints);
                 let position = step.position.map(|v| v as f32);
                 let heading = step.heading as f32 + turn.unwrap_or(step.glance as f32);
                 let root = upright(position, self.height_on_floor(&joints), heading);
                 let mut poses = skeleton::forward_kinematics(&root, p, &joints);
-                task.hands(way, &step, p, &mut poses);
+                task.hands(route, &step, p, &mut poses);
                 poses
             }
             Plan::Sit(seat) => self.seated(seat, 0.0, t),

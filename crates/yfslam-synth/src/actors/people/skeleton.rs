@@ -201,8 +201,8 @@ pub fn reach(poses: &mut BonePoses, p: &Proportions, side: usize, target: &Vec3)
     let elbow = shoulder + along * share + pole * aside;
     let palm = shoulder + along * distance;
     let right = chest.rotation * Vec3::x();
-    poses[Bone::UpperArm(side).index()] = hanging(&shoulder, &elbow, &right);
-    poses[Bone::Forearm(side).index()] = hanging(&elbow, &palm, &right);
+    poses[Bone::UpperArm(side).index()] = bone_between(&shoulder, &elbow, &right);
+    poses[Bone::Forearm(side).index()] = bone_between(&elbow, &palm, &right);
 }
 
 /// Wrist to palm as a share of body height.
@@ -215,7 +215,7 @@ pub fn palm(poses: &BonePoses, p: &Proportions, side: usize) -> Vec3 {
 }
 
 /// Pose of a bone that starts at `from`, points to `to` and has its x axis about along `right`.
-fn hanging(from: &Vec3, to: &Vec3, right: &Vec3) -> Isometry3<f32> {
+fn bone_between(from: &Vec3, to: &Vec3, right: &Vec3) -> Isometry3<f32> {
     let z = (from - to).normalize();
     let x = (right - z * right.dot(&z)).normalize();
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));

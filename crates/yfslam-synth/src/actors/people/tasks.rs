@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
 use super::skeleton::{self, BonePoses, Joints, Proportions};
 use super::{gait, smooth, upright};
-use crate::actors::rounds::Way;
+use crate::actors::routes::Route;
 use crate::actors::walkway::{Step, Walkway};
 use crate::config::CarriedObject;
 use crate::mesh::Vec3;
@@ -58,7 +58,7 @@ enum Handling {
 
 impl Task {
     /// Bends the walker as the task asks for; returns the turn relative to the way if the task decides on it.
-    pub fn prepare(self, way: &Way, step: &Step, joints: &mut Joints) -> Option<f32> {
+    pub fn prepare(self, route: &Route, step: &Step, joints: &mut Joints) -> Option<f32> {
         match self {
             Self::Nothing => None,
             Self::Push => {
@@ -66,27 +66,27 @@ impl Task {
                 Some(0.0)
             }
             Self::Carry(object) => {
-                let Way::Around(way) = way else { return None };
-                let (turned, bent) = match handling(way, step) {
+                let Route::Around(route) = route else { return None };
+                let (turned, bent) = match handling(route, step) {
                     Handling::Fetched(_, t) | Handling::PutDown(_, t) => (turned(t), bent(t)),
                     _ => return None,
                 };
                 // A laptop is low: hands reach down to the floor.
                 gait::stoop(joints, bent * if object == CarriedObject::Laptop { LOW } else { 1.0 });
-                Some(inwards(way) * turned)
+                Some(inwards(route) * turned)
             }
         }
     }
 
     /// Puts the hands where the task needs them.
-    pub fn hands(self, way: &Way, step: &Step, p: &Proportions, poses: &mut BonePoses) {
-        let (thing, grip, firm) = match self {
+    pub fn hands(self, route: &Route, step: &Step, p: &Proportions, poses: &mut BonePoses) {
+        let (rigid_actor, grip, firm) = match self {
             Self::Nothing => return,
             Self::Push => (chair(step), CHAIR_GRIP_M, 1.0),
             Self::Carry(object) => {
-                let handling = match way {
-                    Way::Around(way) => handling(way, step),
-                    Way::Along(_) => Handling::Held,
+                let handling = match route {
+                    Route::Around(route) => handling(route, step),
+                    Route::Along(_) => Handling::Held,
                 };
                 let firm = match handling {
                     Handling::Held => 1.0,
@@ -106,11 +106,11 @@ impl Task {
                         }
                     }
                 };
-                (carried(object, way, step, poses), grip_m(object), firm)
+                (carried(object, route, step, poses), grip_m(object), firm)
             }
         };
         for (side, sign) in [(0, 1.0), (1, -1.0)] {
-            let on_thing = (thing * Point3::new(sign * grip[0], grip[1], grip[2])).coords;
+            let on_thing = (rigid_actor * Point3::new(sign * grip[0], grip[1], grip[2])).coords;
             let free = skeleton::palm(poses, p, side);
             skeleton::reach(poses, p, side, &(free + (on_thing - free) * firm));
         }
@@ -132,7 +132,7 @@ pub fn grip_m(object: CarriedObject) -> [f32; 3] {
 }
 
 /// Pose of what is carried: the middle of its bottom, in the hands of the one whose bones are given, or on the floor.
-pub fn carried(object: CarriedObject, way: &Way, step: &Step, poses: &BonePoses) -> Isometry3<f32> {
+pub fn carried(object: CarriedObject, route: &Route, step: &Step, poses: &BonePoses) -> Isometry3<f32> {
     // The hips' own turn and roll are left out: hands keep things level.
     let hips = poses[0].translation.vector;
     let [ahead, up] = match object {
@@ -141,27 +141,27 @@ pub fn carried(object: CarriedObject, way: &Way, step: &Step, poses: &BonePoses)
     };
     let held =
         |turn: f32| upright([hips.x, hips.y], hips.z, step.heading as f32 + turn) * Translation3::new(0.0, ahead, up);
-    let Way::Around(way) = way else { return held(0.0) };
+    let Route::Around(route) = route else { return held(0.0) };
     let between = |stop: usize, t: f32| {
-        let (from, to, share) = (held(inwards(way) * turned(t)), left_at(way, stop), bent(t));
+        let (from, to, share) = (held(inwards(route) * turned(t)), left_at(route, stop), bent(t));
         Isometry3::from_parts(
             Translation3::from(from.translation.vector.lerp(&to.translation.vector, share)),
             from.rotation.nlerp(&to.rotation, share),
         )
     };
-    match handling(way, step) {
+    match handling(route, step) {
         Handling::Held => held(0.0),
-        Handling::Left(stop) => left_at(way, stop),
+        Handling::Left(stop) => left_at(route, stop),
         Handling::Fetched(stop, t) => {
             if t < 0.5 {
-                left_at(way, stop)
+                left_at(route, stop)
             } else {
                 between(stop, t)
             }
         }
         Handling::PutDown(stop, t) => {
             if t >= 0.5 {
-                left_at(way, stop)
+                left_at(route, stop)
             } else {
                 between(stop, t)
             }
@@ -170,18 +170,18 @@ pub fn carried(object: CarriedObject, way: &Way, step: &Step, poses: &BonePoses)
 }
 
 /// Pose on the floor at a stop: beside the way, on its inner side.
-fn left_at(way: &Walkway, stop: usize) -> Isometry3<f32> {
-    let (position, heading) = way.place_of(stop);
-    let turn = UnitQuaternion::from_axis_angle(&Vec3::z_axis(), heading as f32 + inwards(way));
+fn left_at(route: &Walkway, stop: usize) -> Isometry3<f32> {
+    let (position, heading) = route.place_of(stop);
+    let turn = UnitQuaternion::from_axis_angle(&Vec3::z_axis(), heading as f32 + inwards(route));
     let ahead = turn * Vec3::new(0.0, PUT_AHEAD_M, 0.0);
     let place = Translation3::new(position[0] as f32 + ahead.x, position[1] as f32 + ahead.y, 0.0);
     Isometry3::from_parts(place, turn)
 }
 
 /// A quarter turn towards the middle of the round.
-fn inwards(way: &Walkway) -> f32 {
+fn inwards(route: &Walkway) -> f32 {
     let quarter = std::f32::consts::FRAC_PI_2;
-    if way.is_clockwise() { -quarter } else { quarter }
+    if route.is_clockwise() { -quarter } else { quarter }
 }
 
 /// How far one has turned to the side: there and back.
@@ -194,9 +194,9 @@ fn bent(t: f32) -> f32 {
     smooth((t - 0.17) / 0.28) * (1.0 - smooth((t - 0.55) / 0.28))
 }
 
-fn handling(way: &Walkway, step: &Step) -> Handling {
-    let (legs, first) = way.leg_to(STOPS[0]);
-    let (_, second) = way.leg_to(STOPS[1]);
+fn handling(route: &Walkway, step: &Step) -> Handling {
+    let (legs, first) = route.leg_to(STOPS[0]);
+    let (_, second) = route.leg_to(STOPS[1]);
     // P is visited before Q in each round.
     let (p, q) = if first < second { (STOPS[0], STOPS[1]) } else { (STOPS[1], STOPS[0]) };
     let (leg_p, leg_q) = (first.min(second), first.max(second));
