@@ -3,10 +3,11 @@
 //! In: a [`WorldConfig`]. Out: frames. A frame depends on the configuration and its number alone: any order, any number
 //! of threads and any machine of one kind give the same bits.
 
+mod distance;
+
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use rayon::prelude::*;
 use yfslam::image::{DepthImage, Image, RgbImage};
 use yfslam::{BoundingBox, Camera, Detection, RgbdFrame};
 
@@ -15,10 +16,10 @@ use crate::bake::Baker;
 use crate::camera_path::CameraPath;
 use crate::config::{WorldConfig, WorldError, default_camera};
 use crate::flicker;
-use crate::light::{Lights, Occluder};
+use crate::light::Occluder;
 use crate::render::rays::RayTable;
 use crate::render::shade::View;
-use crate::render::{self, Backdrop, Rendering};
+use crate::render::{self, Rendering};
 use crate::rng::hash;
 use crate::scene::Scene;
 use crate::sensor;
@@ -240,46 +241,6 @@ impl World {
             })
             .collect()
     }
-
-    /// Searches how near people and robots come, so that all actors cover the wanted share of the picture.
-    fn choose_distance(&mut self) {
-        const FRAMES: usize = 24;
-        let rays = self.small_rays.clone();
-        let count = FRAMES.min(self.len());
-        let times: Vec<f64> = (0..count).map(|k| self.seconds(k * self.len() / count)).collect();
-        let backdrops: Vec<Backdrop> =
-            times.iter().map(|&t| Backdrop::new(&rays, self.path.pose(t).inverse(), &self.scene.mesh)).collect();
-        // Light does not matter for the share.
-        let dark = Lights::default();
-        let share = |actors: &Actors| {
-            let shares = times.par_iter().zip(&backdrops).map(|(&t, b)| b.share(&rays, &actors.at(t, &dark).0));
-            // Summed in order: a parallel sum would depend on the threads.
-            shares.collect::<Vec<f64>>().iter().sum::<f64>() / count as f64
-        };
-        if !self.actors.has_walkers() {
-            self.person_share = share(&self.actors);
-            return;
-        }
-        let mut try_out = |closeness: f64| {
-            self.actors.set_closeness(&self.scene, &self.config, &self.path, closeness);
-            let reached = share(&self.actors);
-            ((reached - self.config.person_share).abs(), closeness, reached)
-        };
-        let mut best = try_out(-1.0);
-        let mut step = 0.5;
-        for k in -1..=4 {
-            let tried = try_out(f64::from(k) * step);
-            best = if tried.0 < best.0 { tried } else { best };
-        }
-        for _ in 0..4 {
-            step /= 2.0;
-            for closeness in [best.1 - step, best.1 + step] {
-                let tried = try_out(closeness.min(2.0));
-                best = if tried.0 < best.0 { tried } else { best };
-            }
-        }
-        (_, _, self.person_share) = try_out(best.1);
-    }
 }
 
 /// The same view in an image of the given width.
@@ -305,113 +266,4 @@ fn image<T: Copy + Default>(width: usize, height: usize, data: Vec<T>) -> Image<
 }
 
 #[cfg(test)]
-mod tests {
-    use nalgebra::Point3;
-
-    use super::*;
-    use crate::mesh::{Triangle, Vec3};
-
-    /// Compares the masks of frames with the outlines of everyone's mesh, and the boxes' classes with the given ones; returns how
-    /// many pixels of each actor were seen.
-    fn masks_within_outlines(spec: &str, frames: impl Iterator<Item = usize>, classes: &[usize]) -> [usize; 8] {
-        let mut config = crate::parse(&format!("{spec}&width=320&height=240&noise=off")).unwrap();
-        config.light.shadow_rays = 0;
-        let world = World::new(&config).unwrap();
-        let mut seen = [0; 8];
-        for index in frames {
-            let shot = world.frame(index);
-            let (mesh, _) = world.actors.at(world.seconds(index), &Lights::default());
-            let mut outlines = [[f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY]; 8];
-            for triangle in &mesh.triangles {
-                let instance = usize::from(mesh.patches[triangle.patch as usize].instance);
-                for vertex in triangle.vertices {
-                    let p = shot.t_world_cam.inverse() * Point3::from(mesh.vertices[vertex as usize].position.cast());
-                    // What reaches beside or behind the camera has no outline.
-                    let [x, y] = if p.z > 0.05 { config.camera.distort(p.x / p.z, p.y / p.z) } else { [f64::NAN; 2] };
-                    let [x0, y0, x1, y1] = &mut outlines[instance];
-                    let all = x.is_nan();
-                    (*x0, *y0) = if all { (-1e9, -1e9) } else { (x0.min(x), y0.min(y)) };
-                    (*x1, *y1) = if all { (1e9, 1e9) } else { (x1.max(x), y1.max(y)) };
-                }
-            }
-            for (i, &instance) in shot.instances.data().iter().enumerate().filter(|(_, k)| **k > 0) {
-                let (x, y) = ((i % 320) as f64, (i / 320) as f64);
-                let [x0, y0, x1, y1] = outlines[usize::from(instance)];
-                let inside = x >= x0 - 1.0 && x <= x1 + 1.0 && y >= y0 - 1.0 && y <= y1 + 1.0;
-                assert!(inside, "frame {index}: actor {instance} at ({x}, {y}), outside {x0}..{x1}, {y0}..{y1}");
-                seen[usize::from(instance)] += 1;
-            }
-            for (instance, class, _) in shot.boxes {
-                assert_eq!(class, classes[usize::from(instance) - 1], "actor {instance}");
-            }
-        }
-        seen
-    }
-
-    #[test]
-    fn every_mask_lies_within_the_outline_of_its_actor_and_carries_its_class() {
-        let all = "walking_xyz?seed=3&people=3&robots=1&chair=on&carry=on&moved=on&share=0.3";
-        let seen = masks_within_outlines(all, (0..300).step_by(30), &[0, 0, 0, 1, 2, 3, 3]);
-        assert!((1..=6).filter(|&k| seen[k] > 200).count() >= 5, "too little seen for a test: {seen:?}");
-        let laptop = "carried_box?object=laptop&seed=1&people=1&share=0.15&motion=static&frames=900";
-        let seen = masks_within_outlines(laptop, (420..890).step_by(60), &[0, 4]);
-        assert!(seen[2] > 5_000, "too little seen of the laptop: {seen:?}");
-    }
-
-    /// Distance of a point from a triangle.
-    fn distance(p: &Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
-        let to_edge = |a: Vec3, b: Vec3| {
-            let share = (p - a).dot(&(b - a)) / (b - a).norm_squared().max(1e-12);
-            (p - a - (b - a) * share.clamp(0.0, 1.0)).norm()
-        };
-        let normal = (b - a).cross(&(c - a));
-        let is_above = [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (v - u).cross(&(p - u)).dot(&normal) >= 0.0);
-        if is_above && normal.norm() > 1e-12 {
-            return ((p - a).dot(&normal) / normal.norm()).abs();
-        }
-        to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
-    }
-
-    /// Distance of the camera from the nearest surface of anyone at `time`.
-    fn clearance(world: &World, time: f64) -> f32 {
-        let camera: Vec3 = world.path.pose(time).translation.vector.cast();
-        let (mesh, _) = world.actors.at(time, &Lights::default());
-        let corners = |triangle: &Triangle| triangle.vertices.map(|k| mesh.vertices[k as usize].position);
-        mesh.triangles.iter().map(|t| distance(&camera, corners(t))).fold(f32::INFINITY, f32::min)
-    }
-
-    #[test]
-    fn nobody_in_the_suite_and_nothing_they_move_comes_nearer_to_the_camera_than_35_cm() {
-        assert_eq!(distance(&Vec3::new(0.2, 0.2, 0.3), [Vec3::zeros(), Vec3::x(), Vec3::y()]), 0.3);
-        assert_eq!(distance(&Vec3::new(-3.0, 0.5, 4.0), [Vec3::zeros(), Vec3::x(), Vec3::y()]), 5.0);
-        let more = [
-            "corridor_loop?people=6",
-            "corridor_loop?people=3&robots=2&carry=on&chair=on",
-            "corridor_loop?motion=drive",
-        ];
-        let specs = crate::names().into_iter().chain(more);
-        for spec in specs {
-            let forms = ["seed=1", "seed=2&frames=60"];
-            // Elsewhere nobody's way depends on the camera's, and one seed will do.
-            let forms = if spec.starts_with("corridor") { &forms[..] } else { &forms[..1] };
-            for form in forms {
-                let spec = format!("{spec}{}{form}", if spec.contains('?') { '&' } else { '?' });
-                let world = World::new(&crate::parse(&spec).unwrap()).unwrap();
-                let frames = (0..world.len()).step_by(world.len() / 60).collect::<Vec<_>>();
-                let distances = frames.par_iter().map(|&index| clearance(&world, world.seconds(index)));
-                let nearest = distances.reduce(|| f32::INFINITY, f32::min);
-                assert!(nearest > 0.35, "{spec}: {nearest} m");
-            }
-        }
-    }
-
-    #[test]
-    fn people_cover_a_twentieth_of_the_picture_in_every_world_of_the_suite() {
-        for name in crate::names() {
-            for form in ["seed=1&frames=150", "seed=2"] {
-                let world = World::new(&crate::parse(&format!("{name}?{form}")).unwrap()).unwrap();
-                assert!(world.person_share() > 0.05, "{name}?{form}: {}", world.person_share());
-            }
-        }
-    }
-}
+mod tests;
