@@ -1,7 +1,8 @@
-//! How well the official detector finds the synthetic people: a table, and the pictures with its boxes.
+//! Measures how many synthetic people the official detector finds: a table, and images with its boxes.
 //!
 //! `YFSLAM_DATA=... cargo run --release -p yfslam-synth --example recall -- out 30 walking_xyz?seed=1 sitting_rpy?seed=2` takes
-//! every 30th frame; the folder `-` writes no pictures. Green is a person who is found, red one who is missed, blue a detection.
+//! every 30th frame; with the folder `-` no images are written. Green: a person who is found; red: one who is missed; blue: a
+//! detection.
 
 use std::error::Error;
 use std::path::Path;

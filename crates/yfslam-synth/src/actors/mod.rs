@@ -1,8 +1,8 @@
-//! All that moves: people, robots, and things that are pushed, carried or displaced.
+//! All that moves: people, robots, and objects that are pushed, carried or displaced.
 //!
-//! In: a scene, a configuration and a seed. Out: at any time, everyone's posed meshes and the spheres that shade their
-//! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried object, displaced box. What
-//! nobody can move (desks, the chairs of the scene) is no actor.
+//! In: a scene, a configuration and a seed. Out: at any time, the posed meshes of all actors and the spheres that darken their
+//! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried object, displaced box. Objects that
+//! are never moved (desks, the chairs of the scene) are not actors.
 
 pub mod displaced;
 pub mod people;
@@ -29,10 +29,10 @@ use people::{Person, Plan, upright};
 use rigid_actor::RigidActor;
 use routes::{Route, route};
 
-/// Names of the classes of actors, by the class of a [`SynthFrame`](crate::SynthFrame)'s boxes and detections.
+/// Names of the classes of actors, by the class of the boxes and detections of a [`SynthFrame`](crate::SynthFrame).
 pub const CLASS_NAMES: [&str; 5] = ["person", "robot", "chair", "box", "laptop"];
 
-/// What an actor is; the value is the index into [`CLASS_NAMES`].
+/// Class of an actor; the value is the index into [`CLASS_NAMES`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
     Person,
@@ -42,16 +42,16 @@ pub enum Class {
     Laptop,
 }
 
-/// Where a thing is.
+/// Motion of a rigid actor.
 #[derive(Clone, Debug)]
 enum Motion {
     Drives(Route),
-    /// Pushed or carried by the person of this index.
+    /// Pushed or carried by the person with this index.
     Handled(usize),
     Displaced(DisplacedBox),
 }
 
-/// Everyone and everything that moves in a scene.
+/// All actors of a scene.
 #[derive(Clone, Debug)]
 pub struct Actors {
     people: Vec<Person>,
@@ -59,7 +59,7 @@ pub struct Actors {
 }
 
 impl Actors {
-    /// Invites everyone. Their textures are ordered from the scene's palette.
+    /// Creates all actors and orders their textures from the palette of the scene.
     pub fn new(scene: &mut Scene, config: &WorldConfig, path: &CameraPath) -> Self {
         let bodies: Vec<Body> =
             (0..config.people).map(|k| Body::new(k as u8 + 1, &mut scene.palette, config.seed)).collect();
@@ -99,12 +99,12 @@ impl Actors {
         self.rigid_actors.push((rigid_actor(instance), motion));
     }
 
-    /// Number of actors.
+    /// Returns the number of actors.
     pub fn len(&self) -> usize {
         self.people.len() + self.rigid_actors.len()
     }
 
-    /// What actor number `instance` (from 1) is.
+    /// Returns the class of actor number `instance` (from 1).
     pub fn class(&self, instance: u8) -> Class {
         let index = usize::from(instance).saturating_sub(1);
         match index.checked_sub(self.people.len()) {
@@ -115,8 +115,8 @@ impl Actors {
         }
     }
 
-    /// Leads all who go round nearer to the camera (up to 2) or farther from it (0); the further below 0, the later they
-    /// come by.
+    /// Moves the routes of all walkers and drivers closer to the camera (up to 2) or farther from it (0); the further below 0, the
+    /// later they pass the camera.
     pub fn set_closeness(&mut self, scene: &Scene, config: &WorldConfig, path: &CameraPath, closeness: f64) {
         let walkers = self.people.iter_mut().enumerate().filter_map(|(k, person)| match &mut person.plan {
             Plan::Walk(route, _) => Some((k, route)),
@@ -131,13 +131,13 @@ impl Actors {
         }
     }
 
-    /// Whether anyone goes round.
+    /// Returns whether any actor walks or drives along a route.
     pub fn has_walkers(&self) -> bool {
         self.people.iter().any(|person| matches!(person.plan, Plan::Walk(..)))
             || self.rigid_actors.iter().any(|(_, motion)| matches!(motion, Motion::Drives(_)))
     }
 
-    /// Everyone's mesh and occluders at `time` seconds, in world coordinates.
+    /// Returns the mesh and the occluders of all actors at `time` seconds, in world coordinates.
     pub fn at(&self, time: f64, lights: &Lights) -> (Mesh, Vec<Occluder>) {
         let (mut mesh, mut occluders) = (Mesh::default(), Vec::new());
         let poses: Vec<BonePoses> = self.people.iter().map(|person| person.poses(time)).collect();
@@ -167,7 +167,7 @@ impl Actors {
     }
 }
 
-/// What person `k` does.
+/// Returns the activity of person `k`.
 fn plan(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize) -> Plan {
     let walk = || {
         let task = match k {
@@ -185,7 +185,7 @@ fn plan(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize) -> Pla
             (None, Some(place)) => Plan::Stand(*place),
             (None, None) => walk(),
         },
-        // The last ones take the seats.
+        // The last people take the seats.
         Activity::Crowd => match scene.seats.get(config.people - 1 - k) {
             Some(seat) if k + 1 == config.people => Plan::SitAndRise(*seat),
             Some(seat) => Plan::Sit(*seat),
@@ -194,11 +194,11 @@ fn plan(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize) -> Pla
     }
 }
 
-/// Whether the camera sees some of a ball.
+/// Returns whether any part of a ball is in the view of the camera.
 fn in_view(camera: &Camera, t_cam_world: &nalgebra::Isometry3<f64>, center: &Vec3, radius: f64) -> bool {
     let p = (t_cam_world * nalgebra::Point3::from(center.cast::<f64>())).coords;
     let size = [(camera.width, camera.fx, camera.cx, p.x), (camera.height, camera.fy, camera.cy, p.y)];
-    // Planes through the centre of projection and the picture's edges; distortion is allowed for by a tenth of its size.
+    // Planes through the centre of projection and the edges of the image; distortion is allowed for by a tenth of the image size.
     p.z > -radius
         && size.iter().all(|&(pixels, focal, middle, offset)| {
             let slack = 0.1 * pixels as f64;

@@ -1,7 +1,7 @@
 //! Rigid actors: a tracked rescue robot, an office chair, cardboard boxes, an open laptop.
 //!
-//! In: what it is and a seed. Out: a mesh in its own axes (right, forward, up; the origin on the floor below its middle), and
-//! that mesh at a pose.
+//! In: the kind of actor and a seed. Out: a mesh in its own axes (right, forward, up; the origin on the floor below its middle),
+//! and that mesh at a pose.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -20,22 +20,22 @@ const STEEL: [f32; 3] = [0.50, 0.52, 0.55];
 const DARK: [f32; 3] = [0.19, 0.19, 0.21];
 /// A screen that is switched off.
 const GLASS: [f32; 3] = [0.04, 0.04, 0.05];
-/// Height of a laptop's lid and how far it leans back beyond upright, m and rad.
+/// Height of the lid of a laptop, m, and its inclination backward from upright, rad.
 const LID_M: f32 = 0.225;
 const LID_LEANS: f32 = 0.35;
 
 /// A rigid actor.
 #[derive(Clone, Debug)]
 pub struct RigidActor {
-    /// What it is.
+    /// Class.
     pub class: Class,
     mesh: Mesh,
-    /// Spheres that shade the surroundings, in own axes.
+    /// Spheres that darken the surroundings, in own axes.
     spheres: Vec<Occluder>,
 }
 
 impl RigidActor {
-    /// A robot on two tracks, 0.75 m long and 1.2 m high, with a mast, a camera head, an arm and a beacon.
+    /// Builds a robot on two tracks, 0.75 m long and 1.2 m high, with a mast, a camera head, an arm and a beacon.
     pub fn robot(instance: u8, palette: &mut Palette, seed: u64) -> Self {
         let spheres = [(0.2, 0.2), (-0.2, 0.2)].map(|(y, radius)| ball(0.0, y, 0.18, radius));
         Self::build(Class::Robot, instance, palette, seed, spheres.to_vec(), |b| {
@@ -44,7 +44,7 @@ impl RigidActor {
         })
     }
 
-    /// An office chair on castors.
+    /// Builds an office chair on castors.
     pub fn chair(instance: u8, palette: &mut Palette, seed: u64) -> Self {
         let spheres = vec![ball(0.0, 0.0, 0.42, 0.2), ball(0.0, 0.0, 0.1, 0.12)];
         Self::build(Class::Chair, instance, palette, seed, spheres, |b| {
@@ -53,23 +53,23 @@ impl RigidActor {
         })
     }
 
-    /// A cardboard box of the given size.
+    /// Builds a cardboard box of the given size.
     pub fn cardboard(instance: u8, palette: &mut Palette, size: Vec3, seed: u64) -> Self {
         let spheres = vec![ball(0.0, 0.0, size.z / 2.0, 0.4 * size.min().max(0.2))];
         Self::build(Class::Box, instance, palette, seed, spheres, |b| {
             b.density = 600.0;
-            // A hair above the floor, so that the bottom is there when the box is lifted.
+            // Slightly above the floor, so that the bottom is visible when the box is lifted.
             b.cuboid(Vec3::z() * 0.011, size - Vec3::z() * 0.011, 0.0, |_| Material::Cardboard);
         })
     }
 
-    /// An open laptop whose lower half has the given size; its screen is off and faces back.
+    /// Builds an open laptop whose lower half has the given size; its screen is off and faces back.
     pub fn laptop(instance: u8, palette: &mut Palette, size: Vec3, seed: u64) -> Self {
         let spheres = vec![ball(0.0, 0.0, 0.06, 0.12)];
         Self::build(Class::Laptop, instance, palette, seed, spheres, |b| {
             let paint = b.rng.pick([STEEL, [0.30, 0.31, 0.34], [0.74, 0.74, 0.76], [0.20, 0.28, 0.42]]);
             b.density = 900.0;
-            // A hair above the floor, as boxes are.
+            // Slightly above the floor, like boxes.
             b.cuboid(Vec3::z() * 0.011, size, 0.0, |side| match side {
                 Side::Top => Material::Keyboard,
                 _ => Material::Plain(paint),
@@ -84,7 +84,7 @@ impl RigidActor {
         })
     }
 
-    /// Builds a mesh with the tools of scenes, then makes it an actor's.
+    /// Builds a mesh with the scene builder and turns it into an actor.
     fn build(
         class: Class,
         instance: u8,
@@ -108,7 +108,7 @@ impl RigidActor {
         Self { class, mesh, spheres }
     }
 
-    /// Appends the thing at `pose` to `out`, lit by `lights`.
+    /// Appends the actor at `pose` to `out`, lit by `lights`.
     pub fn pose(&self, pose: &Isometry3<f32>, lights: &Lights, out: &mut Mesh) {
         out.append(&self.mesh, |_, vertex| {
             let position = (pose * Point3::from(vertex.position)).coords;
@@ -117,7 +117,7 @@ impl RigidActor {
         });
     }
 
-    /// The spheres at `pose`.
+    /// Returns the spheres at `pose`.
     pub fn occluders(&self, pose: &Isometry3<f32>) -> impl Iterator<Item = Occluder> {
         self.spheres.iter().map(move |s| Occluder { center: (pose * Point3::from(s.center)).coords, ..*s })
     }
@@ -166,11 +166,11 @@ fn robot(b: &mut Builder, paint: [f32; 3]) {
     cube(b, [0.10, 0.34, 0.30], [0.07, 0.05, 0.10], 0.0, DARK);
 }
 
-/// A track at `x`: a rubber belt around two wheels, with lugs as a pattern, and a flat side.
+/// Adds a track at `x`: a rubber belt around two wheels, with lugs as a pattern, and a flat side.
 fn track(b: &mut Builder, x: f32, length: f32, height: f32, width: f32) {
     let (radius, straight) = (height / 2.0, length - height);
     let perimeter = 2.0 * straight + TAU * radius;
-    // Outline at share u of the perimeter, from the front of the upper straight, backwards: (forward, up) and normal.
+    // Outline at share u of the perimeter, from the front of the upper straight, backward: (forward, up) and normal.
     let outline = move |u: f32| -> ([f32; 2], [f32; 2]) {
         let route = u * perimeter;
         let arc = PI * radius;
@@ -204,7 +204,7 @@ fn track(b: &mut Builder, x: f32, length: f32, height: f32, width: f32) {
     }
 }
 
-/// A round lens that looks forward.
+/// Adds a round lens that faces forward.
 fn lens(b: &mut Builder, at: Vec3, radius: f32) {
     let first = b.mesh.vertices.len();
     b.turned(Vec3::zeros(), &[[0.03, 0.0], [0.03, radius], [0.0, radius]], 14, Material::Plain([0.07, 0.08, 0.12]));

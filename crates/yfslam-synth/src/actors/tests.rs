@@ -1,4 +1,4 @@
-//! What moves keeps to the laws of its world: things stay where they are put, hands hold what they carry, feet stand.
+//! Actors obey the laws of their world: objects stay where they are put, hands hold what they carry, standing feet do not slide.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -14,7 +14,7 @@ fn actors(spec: &str) -> (Actors, WorldConfig) {
     (Actors::new(&mut scene, &config, &path), config)
 }
 
-/// Route, task and poses of person 0 at a time.
+/// Returns the route, the task and the poses of person `index`.
 fn walker(actors: &Actors, index: usize) -> (&Person, &Route, Task) {
     let person = &actors.people[index];
     match &person.plan {
@@ -28,7 +28,7 @@ fn distance(a: &Isometry3<f32>, b: &Isometry3<f32>) -> f32 {
 }
 
 #[test]
-fn what_is_carried_is_in_both_hands_never_jumps_and_stays_where_it_was_put_until_fetched() {
+fn a_carried_object_is_in_both_hands_never_jumps_and_stays_where_it_was_put_until_it_is_fetched() {
     for (seed, (name, object)) in (1..4).flat_map(|seed| CarriedObject::ALL.map(|object| (seed, object))) {
         let (actors, _) = actors(&format!("walking_static?seed={seed}&people=2&carry=on&object={name}"));
         assert_eq!(CLASS_NAMES[actors.class(3) as usize], name);
@@ -48,7 +48,7 @@ fn what_is_carried_is_in_both_hands_never_jumps_and_stays_where_it_was_put_until
         for pair in frames.windows(2) {
             let (before, (now, palms)) = (&pair[0].0, &pair[1]);
             assert!(distance(before, now) < 0.08, "the {name} jumps by {} m", distance(before, now));
-            // Exactly: a box that is a hair above the floor is being lifted, and may move to the side.
+            // An exact comparison: a box slightly above the floor is being lifted and may move to the side.
             let on_floor = |pose: &Isometry3<f32>| pose.translation.z == 0.0;
             if !on_floor(now) {
                 lifted += 1;
@@ -93,7 +93,7 @@ fn a_pushed_chair_crosses_the_room_in_the_hands_of_its_pusher() {
 }
 
 #[test]
-fn who_sits_touches_seat_and_floor_and_sinks_into_neither() {
+fn a_sitting_person_touches_seat_and_floor_and_penetrates_neither() {
     for seed in 1..6 {
         let (actors, config) = actors(&format!("sitting_static?seed={seed}&people=2&activity=crowd"));
         let scene = Scene::new(config.scene, config.seed);
@@ -106,7 +106,7 @@ fn who_sits_touches_seat_and_floor_and_sinks_into_neither() {
                 let hips = poses[Bone::Pelvis.index()].translation.vector;
                 let sole = skeleton::lowest_sole(&poses, p);
                 assert!(sole.abs() < 0.035, "seed {seed}: the soles are {sole} m above the floor");
-                // The underside of pelvis and thighs is about 12 cm and 8 cm below their joints.
+                // The undersides of pelvis and thighs are about 12 cm and 8 cm below their joints.
                 let above = hips.z - seat.z;
                 assert!(above > 0.08, "seed {seed}: the hips are {above} m above the seat");
                 if (hips - seat).xy().norm() < 0.002 {
@@ -122,11 +122,11 @@ fn who_sits_touches_seat_and_floor_and_sinks_into_neither() {
 }
 
 #[test]
-fn the_foot_that_stands_slides_by_less_than_a_quarter_of_the_walking_speed() {
+fn a_standing_foot_slides_by_less_than_a_quarter_of_the_walking_speed() {
     let (actors, _) = actors("walking_static?seed=3&people=2");
     let (person, route, _) = walker(&actors, 1);
     let (dt, mut slid, mut walked) = (1.0 / 120.0, 0.0, 0.0);
-    // Heel and ball of both feet; the lowest of them carries.
+    // Heel and ball of both feet; the lowest of them carries the weight.
     let soles = |time: f64| {
         let poses = person.poses(time);
         let at = |side, y| poses[Bone::Foot(side).index()] * Point3::new(0.0, y, -person.body.proportions.ankle());
@@ -148,7 +148,7 @@ fn the_foot_that_stands_slides_by_less_than_a_quarter_of_the_walking_speed() {
 }
 
 #[test]
-fn what_is_displaced_unseen_is_out_of_view_before_and_after_and_ends_elsewhere() {
+fn a_displaced_box_is_out_of_view_before_and_after_and_ends_elsewhere() {
     let mut moved = 0;
     for seed in 1..6 {
         let (actors, config) = actors(&format!("walking_rpy?seed={seed}&people=0&moved=on&frames=600"));
@@ -170,11 +170,11 @@ fn what_is_displaced_unseen_is_out_of_view_before_and_after_and_ends_elsewhere()
     assert!(moved >= 3, "displaced in {moved} of 5 worlds");
     let (still, _) = self::actors("walking_static?seed=1&people=0&moved=on");
     let [(_, Motion::Displaced(box_))] = still.rigid_actors.as_slice() else { unreachable!("one rigid actor") };
-    assert_eq!(box_.at(0.0), box_.at(9.0), "a camera that never turns away sees every move");
+    assert_eq!(box_.at(0.0), box_.at(9.0), "a camera that never turns away has every move in view");
 }
 
 #[test]
-fn nobody_walks_through_anybody() {
+fn no_two_people_walk_through_each_other() {
     for spec in [
         "walking_xyz?seed=2&people=6&share=0.5",
         "walking_xyz?seed=3&people=4&robots=2&carry=on&chair=on",

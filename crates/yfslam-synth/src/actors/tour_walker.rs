@@ -1,32 +1,33 @@
-//! The way of someone who walks the same round as the camera: ahead of it, or towards it and past it at its side.
+//! The route of a person who walks along the camera's circuit: ahead of the camera, or towards it and past it at its side.
 //!
-//! In: a round with its time-table, and how it is walked. Out: position, heading, distance walked and speed at any time. Who
-//! walks beside the round follows its parallel curve, at the place that the round has at that time.
+//! In: a circuit with its timetable, and a manner of walking. Out: position, heading, distance walked and speed at any time. A
+//! person beside the circuit follows its parallel curve, at the place that the circuit has at that time.
 
 use nalgebra::Vector2;
 
 use super::walkway::Step;
 use crate::tour::Tour;
 
-/// Someone on a round.
+/// A person on a circuit.
 #[derive(Clone, Debug)]
 pub struct TourWalker {
     tour: Tour,
     manner: Manner,
-    /// Length of the parallel curve from the start of the round, every [`SAMPLE_S`] of its time-table, for one round; m.
+    /// Length of the parallel curve from the start of the circuit, every [`SAMPLE_S`] of its timetable, for one round; m.
     arc: Vec<f64>,
 }
 
-/// How someone walks a round.
+/// How a person walks along a circuit.
 #[derive(Clone, Copy, Debug)]
 pub struct Manner {
-    /// Where one begins: the time at which the time-table has that place, s.
+    /// Time at which the timetable has the starting place, s.
     pub start_s: f64,
-    /// Speed relative to the time-table's; below 0 one walks the round the other way.
+    /// Speed relative to that of the timetable; below 0 the person walks in the opposite direction.
     pub rate: f64,
-    /// How far one walks beside the round, to the right of the time-table's direction, m.
+    /// Distance beside the circuit, to the right of the direction of the timetable, m.
     pub beside_m: f64,
-    /// One is now early and now late: by up to so many seconds of the time-table, at this angular frequency and phase.
+    /// The person is sometimes early and sometimes late, by up to so many seconds of the timetable, at this angular frequency and
+    /// phase.
     pub waver: [f64; 3],
 }
 
@@ -34,7 +35,7 @@ pub struct Manner {
 const SAMPLE_S: f64 = 0.05;
 
 impl TourWalker {
-    /// Someone who walks `tour` in the given way.
+    /// Creates a person who walks along `tour` in the given manner.
     pub fn new(tour: Tour, manner: Manner) -> Self {
         let samples = (tour.period() / SAMPLE_S).ceil() as usize;
         let places = (0..=samples).map(|k| beside(&tour, k as f64 * tour.period() / samples as f64, manner.beside_m).0);
@@ -46,7 +47,7 @@ impl TourWalker {
         Self { tour, manner, arc }
     }
 
-    /// Where the walker is at `time` seconds.
+    /// Returns the place of the walker at `time` seconds.
     pub fn at(&self, time: f64) -> Step {
         let [size, omega, phase] = self.manner.waver;
         let table = self.manner.start_s + self.manner.rate * time + size * (omega * time + phase).sin();
@@ -66,7 +67,7 @@ impl TourWalker {
         }
     }
 
-    /// Length of the parallel curve up to a time of the time-table, m.
+    /// Returns the length of the parallel curve up to a time of the timetable, m.
     fn length(&self, table: f64) -> f64 {
         let rounds = table.div_euclid(self.tour.period());
         let steps = self.arc.len() - 1;
@@ -76,7 +77,8 @@ impl TourWalker {
     }
 }
 
-/// The place `beside_m` to the right of the round at a time of its time-table, and the unit direction of the round there.
+/// Returns the place `beside_m` to the right of the circuit at a time of its timetable, and the unit direction of the circuit
+/// there.
 fn beside(tour: &Tour, table: f64, beside_m: f64) -> (Vector2<f64>, Vector2<f64>) {
     let [before, here, after] = [-SAMPLE_S, 0.0, SAMPLE_S].map(|h| Vector2::from(tour.place(table + h)));
     let along = (after - before).normalize();
@@ -89,13 +91,13 @@ mod tests {
     use crate::camera_path::WALK;
 
     #[test]
-    fn a_companion_moves_at_the_speed_it_tells_and_looks_where_it_goes_ahead_and_against_the_tour() {
+    fn a_tour_walker_moves_at_its_stated_speed_in_its_heading_ahead_and_against_the_tour() {
         let tour = Tour::new(&[[0.0, 0.0], [0.0, 6.0], [10.0, 6.0], [10.0, -4.0], [0.0, -4.0]], WALK, 40.0);
         for (rate, beside_m) in [(1.0, -0.2), (-0.8, 0.7)] {
             let manner = Manner { start_s: 3.0, rate, beside_m, waver: [0.3, 0.5, 1.0] };
-            let companion = TourWalker::new(tour.clone(), manner);
+            let walker = TourWalker::new(tour.clone(), manner);
             let dt = 0.02;
-            let steps: Vec<Step> = (0..5000).map(|i| companion.at(f64::from(i) * dt)).collect();
+            let steps: Vec<Step> = (0..5000).map(|i| walker.at(f64::from(i) * dt)).collect();
             for pair in steps.windows(2) {
                 let [a, b] = [pair[0].position, pair[1].position].map(Vector2::from);
                 let moved = b - a;
@@ -109,8 +111,9 @@ mod tests {
                 let ahead = Vector2::new(-pair[0].heading.sin(), pair[0].heading.cos());
                 assert!(moved.norm() < 0.002 || ahead.dot(&moved) > 0.97 * moved.norm(), "{ahead} is not {moved}");
             }
-            let lane = steps.iter().map(|step| (Vector2::from(step.position) - nearest(&tour, step.position)).norm());
-            let widest = lane.fold(0.0, f64::max);
+            let distances =
+                steps.iter().map(|step| (Vector2::from(step.position) - nearest(&tour, step.position)).norm());
+            let widest = distances.fold(0.0, f64::max);
             assert!((widest - beside_m.abs()).abs() < 0.02, "{widest} m beside the tour");
         }
     }

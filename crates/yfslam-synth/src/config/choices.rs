@@ -2,23 +2,23 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How the camera is moved, after the freiburg3 sequences of the TUM RGB-D benchmark (Sturm et al., IROS 2012).
+/// Motion of the camera, following the freiburg3 sequences of the TUM RGB-D benchmark (Sturm et al., IROS 2012).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraMotion {
-    /// Held still by hand: 0.28 m in 24.8 s, all of it hand shake.
+    /// Held still by hand: 0.28 m in 24.8 s, only hand shake.
     Static,
-    /// Along the three axes in turn, orientation kept: 5.79 m in 28.8 s.
+    /// Along the three axes in turn with constant orientation: 5.79 m in 28.8 s.
     Xyz,
-    /// Turned about roll, pitch and yaw: 2.70 m in 30.6 s, 21°/s.
+    /// Rotation about roll, pitch and yaw: 2.70 m in 30.6 s, 21°/s.
     Rpy,
-    /// On a half sphere, looking at its centre: 7.69 m in 35.8 s.
+    /// On a half sphere, directed at its centre: 7.69 m in 35.8 s.
     Halfsphere,
-    /// On a wheeled robot, forwards along the scene's round at up to 0.7 m/s, with a little vibration.
+    /// On a wheeled robot, forward along the circuit of the scene at up to 0.7 m/s, with slight vibration.
     Drive,
-    /// Carried once around the scene's round and 6 % past its start, as fast as the number of frames asks for but between
-    /// 0.4 and 1.2 m/s and at most 40°/s. At the fastest the corridor takes 1241 frames at 30 Hz, 1320 with the overlap;
-    /// fewer frames show a part of it.
+    /// Carried once along the circuit of the scene and 6 % past its start. The number of frames sets the speed, within 0.4 to 1.2
+    /// m/s and at most 40°/s. At the highest speed the corridor takes 1241 frames at 30 Hz, 1320 with the overlap; fewer frames
+    /// show a part of it.
     Loop,
 }
 
@@ -34,16 +34,17 @@ impl CameraMotion {
     ];
 }
 
-/// What the people do.
+/// Activity of the people.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Activity {
-    /// They walk around the desk, all the same way and two abreast, stop, turn and walk on. Where a camera on a tour leaves no room
-    /// for that (the corridor), they walk the tour: every second one ahead of the camera, the others towards it and past it.
+    /// They walk around the desk in the same direction, two abreast, stop, turn and walk on. Where a camera on a circuit leaves no
+    /// room for that (the corridor), they walk along its circuit: every second one ahead of the camera, the others towards it and
+    /// past it.
     Walking,
-    /// They sit (or stand, once the chairs are taken) and gesture a little.
+    /// They sit (or stand, once the chairs are taken) and gesture slightly.
     Sitting,
-    /// One sits, one sits down and gets up again and again, all others walk.
+    /// One sits, one repeatedly sits down and gets up, all others walk.
     Crowd,
 }
 
@@ -52,7 +53,7 @@ impl Activity {
     pub const ALL: [(&str, Self); 3] = [("sitting", Self::Sitting), ("walking", Self::Walking), ("crowd", Self::Crowd)];
 }
 
-/// Where it happens.
+/// The scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SceneKind {
@@ -73,14 +74,14 @@ impl SceneKind {
         [("office", Self::Office), ("rescue", Self::Rescue), ("corridor", Self::Corridor), ("lab", Self::Lab)];
 }
 
-/// What someone carries, puts down and fetches again.
+/// The object that a person carries, puts down and fetches again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CarriedObject {
     /// A cardboard box of 36 cm × 26 cm × 24 cm.
     #[default]
     Box,
-    /// An open laptop, 34 cm wide, switched off: its screen is too dark for the depth sensor from some distance on.
+    /// An open laptop, 34 cm wide, switched off: beyond some distance its screen is too dark for the depth sensor.
     Laptop,
 }
 

@@ -1,6 +1,6 @@
 //! Errors of a world configuration.
 
-/// Why a world cannot be made.
+/// Why a world cannot be built.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum WorldError {
     /// A value outside its range.
@@ -8,17 +8,17 @@ pub enum WorldError {
     OutOfRange {
         /// Name of the field.
         name: &'static str,
-        /// The value found.
+        /// The value.
         value: String,
-        /// What is allowed.
+        /// The allowed range.
         range: &'static str,
     },
-    /// A spec that cannot be read.
+    /// A malformed description of a world.
     #[error("`{spec}` does not name a synthetic world: {reason}")]
     Spec {
-        /// The text that was given.
+        /// The description.
         spec: String,
-        /// What is wrong and what would be right.
+        /// What is wrong and what to do.
         reason: String,
     },
 }

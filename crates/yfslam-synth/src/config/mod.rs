@@ -1,4 +1,4 @@
-//! What a synthetic sequence is made of. Everything has a default; unknown keys are refused.
+//! Configuration of a synthetic sequence. Every key has a default; unknown keys are refused.
 
 mod choices;
 mod error;
@@ -21,40 +21,41 @@ pub const MAX_PEOPLE: usize = 6;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WorldConfig {
-    /// Where it happens.
+    /// The scene.
     pub scene: SceneKind,
-    /// How the camera moves.
+    /// Motion of the camera.
     pub motion: CameraMotion,
-    /// What the people do.
+    /// Activity of the people.
     pub activity: Activity,
     /// Number of people, 0 to 6.
     pub people: usize,
-    /// What moves besides people.
+    /// Moving objects other than people. Each is an actor with a number of its own; see [`CLASS_NAMES`](crate::CLASS_NAMES).
     pub actors: ActorsConfig,
-    /// Mean share of the picture that all who walk or drive cover, 0 to 0.8. They stroll more slowly past the camera and nearer
-    /// to it, and for a large share stop before it, to meet it as well as they can; [`World::person_share`](crate::World::person_share) tells what was reached.
+    /// Mean share of the image that walking people and driving robots cover, 0 to 0.8. To reach it they walk past the camera more
+    /// slowly and closer and, for a large share, stop before it; [`World::person_share`](crate::World::person_share) returns the
+    /// share that was reached.
     pub person_share: f64,
     /// Number of frames.
     pub frames: usize,
     /// Seed of textures, people, paths and noise.
     pub seed: u64,
-    /// The camera that is rendered, lens distortion included. Its `fps` is the frame rate, its `depth_factor` the unit
-    /// of depth, its `bf` the baseline of the depth sensor.
+    /// Camera, including its lens distortion. Its `fps` is the frame rate, its `depth_factor` the unit of depth, its `bf` the
+    /// baseline of the depth sensor.
     pub camera: Camera,
-    /// Distance of a second camera to the right of the first, m; 0 for none. A stereo camera has no depth image, no lens distortion,
-    /// and `camera.bf` is this times `camera.fx`.
+    /// Distance of a second camera to the right of the first, m; 0 for none. A stereo camera has no depth image and no lens
+    /// distortion, and `camera.bf` is this distance times `camera.fx`.
     pub stereo_m: f64,
     /// Strength of the hand shake; 1 has the path length of `walking_static`, 0 none.
     pub hand_shake: f64,
-    /// Light and its quality.
+    /// Light.
     pub light: LightConfig,
-    /// What the sensor adds to the exact picture.
+    /// Errors of the sensor.
     pub sensor: SensorConfig,
-    /// Whether frames carry the exact boxes of visible people as detections.
+    /// Whether frames have the exact boxes of visible people as detections.
     pub detections: bool,
-    /// Least number of visible pixels for a box, at 640 × 480; scales with the image area.
+    /// Least number of visible pixels for a box at 640 × 480; it scales with the image area.
     pub min_person_px: usize,
-    /// Whether object edges are smoothed (four samples per edge pixel).
+    /// Whether object edges are anti-aliased with four samples per edge pixel.
     pub antialias: bool,
 }
 
@@ -81,24 +82,24 @@ impl Default for WorldConfig {
     }
 }
 
-/// What moves besides people. Each is an actor with a number of its own; see [`CLASS_NAMES`](crate::CLASS_NAMES).
+/// Moving objects other than people. Each is an actor with a number of its own; see [`CLASS_NAMES`](crate::CLASS_NAMES).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ActorsConfig {
-    /// Number of rescue robots that drive around among the people; with them at most 6.
+    /// Number of rescue robots that drive among the people; at most 6 together with the people.
     pub robots: usize,
-    /// Whether a walking person pushes a chair around: the first one who carries nothing.
+    /// Whether the first walking person who carries nothing pushes a chair.
     pub pushed_chair: bool,
-    /// Whether the first walking person carries something, puts it down, leaves it there and fetches it again.
+    /// Whether the first walking person carries an object, puts it down, leaves it there and fetches it again.
     pub carried_box: bool,
-    /// What that is; a box unless `carried_box` is on.
+    /// The carried object; `box` unless `carried_box` is on.
     pub carried_object: CarriedObject,
-    /// Whether a box is displaced while it and its new place are out of the camera's view. If that never happens within
-    /// the sequence, it stays where it is.
+    /// Whether a box is displaced while it and its new place are outside the view of the camera. If that never happens within the
+    /// sequence, it stays where it is.
     pub moved_object: bool,
 }
 
-/// The calibration of freiburg3 as the TUM benchmark's web page gives it: no distortion.
+/// Returns the calibration of freiburg3 from the web page of the TUM benchmark, which has no distortion.
 pub fn default_camera() -> Camera {
     Camera {
         width: 640,
@@ -119,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_survives_a_round_trip_through_toml_and_unknown_keys_are_refused() {
+    fn the_default_is_the_same_after_toml_and_unknown_keys_are_refused() {
         let text = toml::to_string(&WorldConfig::default()).unwrap();
         assert_eq!(toml::from_str::<WorldConfig>(&text).unwrap(), WorldConfig::default());
         let error = toml::from_str::<WorldConfig>("poeple = 3").unwrap_err().to_string();

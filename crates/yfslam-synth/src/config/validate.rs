@@ -3,7 +3,7 @@
 use super::{Activity, CarriedObject, MAX_PEOPLE, WorldConfig, WorldError};
 
 impl WorldConfig {
-    /// Refuses values that no world can be made of.
+    /// Refuses values that are out of range.
     pub(crate) fn validate(&self) -> Result<(), WorldError> {
         let camera = &self.camera;
         let size = 16..=4096;
@@ -19,8 +19,8 @@ impl WorldConfig {
             self.people,
             "at least as many as push a chair or carry a box, and they must walk (activity `walking`)",
         )?;
-        let nobody_carries = !actors.carried_box && actors.carried_object != CarriedObject::Box;
-        check(!nobody_carries, "actors.carried_object", "not a box", "left out unless `carried_box` is on")?;
+        let is_misplaced = !actors.carried_box && actors.carried_object != CarriedObject::Box;
+        check(!is_misplaced, "actors.carried_object", "not a box", "omitted unless `carried_box` is on")?;
         check((0.0..=0.8).contains(&self.person_share), "person_share", self.person_share, "between 0 and 0.8")?;
         check((1..=1_000_000).contains(&self.frames), "frames", self.frames, "between 1 and 1000000")?;
         check(size.contains(&camera.width), "camera.width", camera.width, "between 16 and 4096 px")?;
@@ -40,7 +40,7 @@ impl WorldConfig {
                 distortion == [0.0; 5],
                 "camera.distortion",
                 format!("{distortion:?}"),
-                "zero for a stereo camera, whose pictures are rectified (such as --camera tum3)",
+                "zero for a stereo camera, whose images are rectified (such as --camera tum3)",
             )?;
             let same = (camera.bf / (self.stereo_m * camera.fx) - 1.0).abs() < 1e-6;
             check(same, "camera.bf", camera.bf, "stereo_m times camera.fx")?;

@@ -1,5 +1,5 @@
-//! A damaged hall: bare concrete, pillars with warning stripes, heaps of rubble, a fallen slab, crates, barrels and pipes
-//! under a few lamps. Little texture, many edges.
+//! A damaged hall: bare concrete, pillars with warning stripes, heaps of rubble, a fallen slab, crates, barrels and pipes under a
+//! few lamps. It has little texture and many edges.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion};
 
@@ -17,7 +17,7 @@ const HEIGHT: f32 = 4.4;
 const CONCRETE: [f32; 3] = [0.58, 0.57, 0.55];
 const RUST: [f32; 3] = [0.45, 0.30, 0.22];
 
-/// A way around the large heap for robots and people, which rubble leaves free.
+/// A circuit around the large heap for robots and people, which stays free of rubble.
 const CIRCUIT: [[f64; 2]; 6] = [[0.0, -2.3], [-4.3, -2.2], [-4.5, 4.0], [-1.0, 6.3], [4.4, 5.8], [4.6, -2.2]];
 
 pub fn build(seed: u64) -> Scene {
@@ -58,7 +58,7 @@ pub fn build(seed: u64) -> Scene {
     }
 }
 
-/// Floor, walls, ceiling beams, lamps.
+/// Adds floor, walls, ceiling beams, lamps.
 fn shell(b: &mut Builder, walls: &[Wall; 4]) -> Vec<Lamp> {
     let (dx, dy) = ((X[1] - X[0]) / 4.0, (Y[1] - Y[0]) / 4.0);
     for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
@@ -97,7 +97,7 @@ fn pillars(b: &mut Builder) {
     }
 }
 
-/// A slab of the roof that leans on the large heap, and pipes across it.
+/// Adds a slab of the roof that leans on the large heap, and pipes across it.
 fn fallen(b: &mut Builder) {
     let tilt = UnitQuaternion::from_euler_angles(0.42, -0.14, 0.35);
     b.density = 240.0;
@@ -117,7 +117,7 @@ fn fallen(b: &mut Builder) {
     }
 }
 
-/// Broken concrete, piled higher towards the middle; the ways stay free.
+/// Adds broken concrete, piled higher towards the middle; the routes stay free.
 fn heap(b: &mut Builder, [x, y]: [f32; 2], radius: f32, height: f32, count: usize) {
     for k in 0..count {
         let (angle, far) = (b.rng.range(0.0, std::f32::consts::TAU), b.rng.range(0.0, 1.0).sqrt());
@@ -127,7 +127,7 @@ fn heap(b: &mut Builder, [x, y]: [f32; 2], radius: f32, height: f32, count: usiz
         if !is_free(at, 0.45 + 0.5 * size.max()) {
             continue;
         }
-        // Later pieces lie on earlier ones.
+        // Later fragments lie on earlier ones.
         let z = height * (1.0 - far).min(0.6) * (k as f32 / count as f32) + 0.08;
         let turn =
             UnitQuaternion::from_euler_angles(b.rng.range(-0.7, 0.7), b.rng.range(-0.7, 0.7), b.rng.range(-3.1, 3.1));
@@ -138,7 +138,7 @@ fn heap(b: &mut Builder, [x, y]: [f32; 2], radius: f32, height: f32, count: usiz
     }
 }
 
-/// Whether something at `place` leaves the round and the ground before the camera free by `margin`.
+/// Returns whether an object at `place` leaves the circuit and the ground before the camera free by `margin`.
 fn is_free(place: [f32; 2], margin: f32) -> bool {
     let [x, y] = place.map(f64::from);
     let margin = f64::from(margin);
@@ -151,7 +151,7 @@ fn is_free(place: [f32; 2], margin: f32) -> bool {
     off_round && (x.abs() > 2.5 + margin || y < -4.0 + margin || y > 0.45 + margin)
 }
 
-/// Crates, barrels and boards: what was stored here.
+/// Adds crates, barrels and boards.
 fn stores(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     let wood = Material::Planks([0.62, 0.47, 0.30]);
     for (x, y, z, size, yaw) in [

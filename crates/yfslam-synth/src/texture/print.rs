@@ -1,5 +1,5 @@
-//! Printed matter: posters, books, paper, boxes, screens, keyboards, whiteboards. Rectangles and letters of many sizes
-//! give corners at every scale.
+//! Printed matter: posters, books, paper, boxes, screens, keyboards, whiteboards. Rectangles and letters of many sizes give corners
+//! at every scale.
 
 use super::Color;
 use super::canvas::Canvas;
@@ -22,13 +22,13 @@ const INKS: [Color; 9] = [
 pub(super) const WHITE: Color = [0.95, 0.95, 0.93];
 pub(super) const BLACK: Color = [0.10, 0.10, 0.11];
 
-/// One of the printing colours.
+/// Returns one of the printing colours.
 pub fn ink(rng: &mut Rng) -> Color {
     let factor = rng.range(0.8, 1.15);
     tint(rng.pick(INKS), factor)
 }
 
-/// A random word that fills the width; returns its height.
+/// Writes a random word that fills the width; returns its height.
 pub fn word(canvas: &mut Canvas, x: f32, y: f32, width: f32, color: Color, rng: &mut Rng) -> f32 {
     let text = rng.pick(WORDS);
     let cell = width / (text.len() as f32 * 4.0 - 1.0);
@@ -36,7 +36,7 @@ pub fn word(canvas: &mut Canvas, x: f32, y: f32, width: f32, color: Color, rng: 
     5.0 * cell
 }
 
-/// Lines of words like print, `line` high each.
+/// Writes lines of words like print, each `line` high.
 pub(super) fn paragraph(canvas: &mut Canvas, area: [f32; 4], line: f32, color: Color, rng: &mut Rng) {
     let [x, y, w, h] = area;
     let rows = (h / line) as usize;
@@ -51,7 +51,7 @@ pub(super) fn paragraph(canvas: &mut Canvas, area: [f32; 4], line: f32, color: C
     }
 }
 
-/// A picture within an area: mosaic, landscape, chart, rings or a network.
+/// Draws an illustration within an area: mosaic, landscape, chart, rings or a network.
 pub(super) fn illustration(canvas: &mut Canvas, area: [f32; 4], rng: &mut Rng) {
     let [x, y, w, h] = area;
     let seed = rng.bits();
@@ -129,17 +129,17 @@ pub(super) fn poster(canvas: &mut Canvas, rng: &mut Rng) {
         let x = 0.04 * w + c as f32 * column;
         let inner = column - 0.04 * w;
         let mut y = top + 0.03 * h;
-        let mut with_picture = c % 2 == 0;
+        let mut with_illustration = c % 2 == 0;
         while y < 0.9 * h {
             let height = rng.range(0.16, 0.30) * h;
             let height = height.min(0.97 * h - y);
-            if with_picture {
+            if with_illustration {
                 illustration(canvas, [x, y, inner, height], rng);
             } else {
                 canvas.rect(x, y, inner * 0.6, 0.018 * h, head);
                 paragraph(canvas, [x, y + 0.03 * h, inner, height - 0.03 * h], 0.016 * h, text, rng);
             }
-            with_picture = !with_picture;
+            with_illustration = !with_illustration;
             y += height + 0.03 * h;
         }
     }

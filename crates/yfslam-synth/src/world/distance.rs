@@ -8,7 +8,7 @@ use crate::light::Lights;
 use crate::render::Backdrop;
 
 impl World {
-    /// Searches how near people and robots come, so that all actors cover the wanted share of the picture.
+    /// Searches the closeness of people and robots at which all actors cover the wanted share of the image.
     pub(super) fn choose_distance(&mut self) {
         const FRAMES: usize = 24;
         let rays = self.small_rays.clone();

@@ -1,7 +1,7 @@
-//! The world: random access to rendered frames and their ground truth.
+//! Random access to rendered frames of a synthetic world and their ground truth.
 //!
-//! In: a [`WorldConfig`]. Out: frames. A frame depends on the configuration and its number alone: any order, any number
-//! of threads and any machine of one kind give the same bits.
+//! In: a [`WorldConfig`]. Out: frames. A frame depends only on the configuration and its number: any order, any number of threads
+//! and any machine of one kind give the same bits.
 
 mod distance;
 
@@ -27,7 +27,7 @@ use crate::sensor::blur::CameraMove;
 use crate::sensor::exposure::Meter;
 use crate::surfaces::Surfaces;
 
-/// Width of the small pictures that estimates are made on, px.
+/// Width of the small renderings from which shares and brightness are estimated, px.
 const SMALL_WIDTH: usize = 48;
 
 /// A synthetic sequence, ready to render.
@@ -39,41 +39,41 @@ pub struct World {
     path: CameraPath,
     surfaces: Surfaces,
     rays: RayTable,
-    /// Rays of a small picture, for estimates over the whole view.
+    /// Rays of a small rendering, for estimates over the whole view.
     small_rays: RayTable,
     meter: Meter,
     person_share: f64,
 }
 
-/// A rendered frame and all that is known about it.
+/// A rendered frame and its ground truth.
 #[derive(Clone, Debug)]
 pub struct SynthFrame {
-    /// What a SLAM system sees. Detections are there if [`WorldConfig::detections`] asks for them.
+    /// The input of a SLAM system. It has detections if [`WorldConfig::detections`] is set.
     pub frame: RgbdFrame,
-    /// Time of the depth image, ns; that of the colour image plus [`SensorConfig::depth_offset_s`](crate::SensorConfig).
+    /// Time of the depth image, ns: that of the colour image plus [`SensorConfig::depth_offset_s`](crate::SensorConfig).
     pub depth_timestamp_ns: i64,
     /// Exact pose at the time of the colour image: world from camera.
     pub t_world_cam: Isometry3<f64>,
-    /// 0 where the world stands still, k where actor k (from 1) is seen.
+    /// 0 for the static world, k for actor k (from 1).
     pub instances: Image<u8>,
-    /// Depth along the optical axis in metres without any error; 0 where nothing is seen.
+    /// Exact depth along the optical axis, m; 0 where nothing is visible.
     pub exact_depth: Image<f32>,
-    /// Exact boxes of the actors that are visible enough, in the order of their numbers: number, class (an index into
+    /// Exact boxes of the sufficiently visible actors, in the order of their numbers: number, class (an index into
     /// [`CLASS_NAMES`](crate::CLASS_NAMES)), tight bounds of the visible pixels.
     pub boxes: Vec<(u8, usize, BoundingBox)>,
 }
 
 impl World {
-    /// Builds the scene and plans everyone's way. Textures are painted and light is baked when a frame first shows them.
+    /// Builds the scene and plans the motion of all actors. Textures and light maps are computed when a frame first shows them.
     ///
     /// # Errors
-    /// If a value of the configuration is out of range.
+    /// A value of the configuration is out of range.
     pub fn new(config: &WorldConfig) -> Result<Self, WorldError> {
         config.validate()?;
         let mut scene = Scene::new(config.scene, config.seed);
         let path = CameraPath::new(config, &scene);
         let actors = Actors::new(&mut scene, config, &path);
-        // Textures for the default focal length suit any other when they have as many more or fewer texels.
+        // Textures for the default focal length suit any other if the number of texels scales with it.
         let sharpness = config.camera.fx.max(config.camera.fy) / default_camera().fx;
         let baker = Baker::new(&scene.mesh, scene.lights.clone(), config.light.shadow_rays);
         let palette = std::mem::take(&mut scene.palette);
@@ -88,37 +88,37 @@ impl World {
         Ok(world)
     }
 
-    /// The configuration it was made of.
+    /// Returns the configuration.
     pub fn config(&self) -> &WorldConfig {
         &self.config
     }
 
-    /// Number of frames.
+    /// Returns the number of frames.
     pub fn len(&self) -> usize {
         self.config.frames
     }
 
-    /// Whether there are no frames (never: a world has at least one).
+    /// Returns whether there are no frames, which is never the case.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Mean share of the picture that actors cover over the sequence, estimated on small pictures of some frames.
+    /// Returns the mean share of the image that actors cover over the sequence, estimated from small renderings of some frames.
     pub fn person_share(&self) -> f64 {
         self.person_share
     }
 
-    /// Time of frame `index`, ns.
+    /// Returns the time of frame `index`, ns.
     pub fn timestamp_ns(&self, index: usize) -> i64 {
         to_ns(self.seconds(index))
     }
 
-    /// Exact pose (world from camera) of frame `index`.
+    /// Returns the exact pose (world from camera) of frame `index`.
     pub fn pose(&self, index: usize) -> Isometry3<f64> {
         self.path.pose(self.seconds(index))
     }
 
-    /// Renders frame `index`; numbers past the end go on with the same motion.
+    /// Renders frame `index`; numbers past the end continue the motion.
     pub fn frame(&self, index: usize) -> SynthFrame {
         let (time, t_world_cam) = (self.seconds(index), self.pose(index));
         let rendering = self.render(&self.rays, time, &t_world_cam);
@@ -152,8 +152,8 @@ impl World {
         }
     }
 
-    /// What a second camera sees at the time of frame `index`, which is fixed to the first: `mount` is the pose of its frame in that of
-    /// the first, `camera` its lens, distortion included.
+    /// Renders the image of a second camera, fixed to the first, at the time of frame `index`: `mount` is its pose in the frame of
+    /// the first camera, `camera` its calibration with distortion.
     pub fn second_view(&self, index: usize, camera: &Camera, mount: &Isometry3<f64>) -> RgbImage {
         self.second(&RayTable::new(camera), index, mount)
     }
@@ -185,7 +185,8 @@ impl World {
         render::render(rays, &t_cam_world, &view, self.config.antialias)
     }
 
-    /// The colour image of a camera mounted at `mount` on the first, which sets the exposure of both: blur, gain, development.
+    /// Computes the colour image of a camera mounted at `mount` on the first, which sets the exposure of both: blur, gain,
+    /// development.
     fn expose(&self, rays: &RayTable, rendering: &Rendering, time: f64, mount: &Isometry3<f64>, seed: u64) -> RgbImage {
         let (sensor, (width, height)) = (&self.config.sensor, (rays.width, rays.height));
         let gain = self.config.light.exposure * self.meter.gain(time, |at| self.brightness(at));
@@ -197,7 +198,7 @@ impl World {
         sensor::color::develop(linear, width, height, gain, sensor.color_noise, seed)
     }
 
-    /// The depth image, which may show the world a little later than the colour image.
+    /// Computes the depth image, which may show the world slightly later than the colour image.
     fn measure(&self, rendering: &Rendering, time: f64, seed: u64) -> DepthImage {
         let (camera, sensor) = (&self.config.camera, &self.config.sensor);
         let later = (sensor.depth_offset_s != 0.0).then(|| {
@@ -207,10 +208,10 @@ impl World {
         sensor::depth::measure(later.as_ref().unwrap_or(rendering), &self.rays, camera, sensor, seed)
     }
 
-    /// Mean brightness of the picture, as automatic exposure meters it.
+    /// Returns the mean brightness of the image, as measured by automatic exposure.
     fn brightness(&self, time: f64) -> f32 {
         let rendering = self.render(&self.small_rays, time, &self.path.pose(time));
-        // White clips: a lamp in the picture does not count for more.
+        // White is clipped: a lamp in the image does not count for more.
         let sum: f32 = rendering.color.iter().map(|rgb| rgb.iter().map(|v| v.min(1.0)).sum::<f32>() / 3.0).sum();
         sum / rendering.color.len().max(1) as f32
     }
@@ -221,7 +222,7 @@ impl World {
         occluders.iter().map(|o| Occluder { center: moved(o), ..*o }).collect()
     }
 
-    /// Boxes around the visible pixels of every actor with enough of them.
+    /// Returns the boxes around the visible pixels of all actors with enough of them.
     fn boxes(&self, instances: &[u8]) -> Vec<(u8, usize, BoundingBox)> {
         let least = self.config.min_person_px as f64 * instances.len() as f64 / (640.0 * 480.0);
         let mut found = vec![(0usize, [usize::MAX, usize::MAX, 0, 0]); self.actors.len() + 1];
@@ -243,7 +244,7 @@ impl World {
     }
 }
 
-/// The same view in an image of the given width.
+/// Returns the camera for the same view in an image of the given width.
 fn shrink(camera: &Camera, width: usize) -> Camera {
     let scale = camera.width as f64 / width as f64;
     Camera {

@@ -5,8 +5,8 @@ use super::*;
 use crate::light::Lights;
 use crate::mesh::{Triangle, Vec3};
 
-/// Compares the masks of frames with the outlines of everyone's mesh, and the boxes' classes with the given ones; returns how
-/// many pixels of each actor were seen.
+/// Compares the masks of frames with the outlines of the meshes of all actors, and the classes of boxes with `classes`; returns how
+/// many pixels of each actor were visible.
 fn masks_within_outlines(spec: &str, frames: impl Iterator<Item = usize>, classes: &[usize]) -> [usize; 8] {
     let mut config = crate::parse(&format!("{spec}&width=320&height=240&noise=off")).unwrap();
     config.light.shadow_rays = 0;
@@ -20,7 +20,7 @@ fn masks_within_outlines(spec: &str, frames: impl Iterator<Item = usize>, classe
             let instance = usize::from(mesh.patches[triangle.patch as usize].instance);
             for vertex in triangle.vertices {
                 let p = shot.t_world_cam.inverse() * Point3::from(mesh.vertices[vertex as usize].position.cast());
-                // What reaches beside or behind the camera has no outline.
+                // A part beside or behind the camera has no outline.
                 let [x, y] = if p.z > 0.05 { config.camera.distort(p.x / p.z, p.y / p.z) } else { [f64::NAN; 2] };
                 let [x0, y0, x1, y1] = &mut outlines[instance];
                 let all = x.is_nan();
@@ -43,16 +43,16 @@ fn masks_within_outlines(spec: &str, frames: impl Iterator<Item = usize>, classe
 }
 
 #[test]
-fn every_mask_lies_within_the_outline_of_its_actor_and_carries_its_class() {
+fn every_mask_lies_within_the_outline_of_its_actor_and_has_its_class() {
     let all = "walking_xyz?seed=3&people=3&robots=1&chair=on&carry=on&moved=on&share=0.3";
     let seen = masks_within_outlines(all, (0..300).step_by(30), &[0, 0, 0, 1, 2, 3, 3]);
-    assert!((1..=6).filter(|&k| seen[k] > 200).count() >= 5, "too little seen for a test: {seen:?}");
+    assert!((1..=6).filter(|&k| seen[k] > 200).count() >= 5, "too few visible pixels for a test: {seen:?}");
     let laptop = "carried_box?object=laptop&seed=1&people=1&share=0.15&motion=static&frames=900";
     let seen = masks_within_outlines(laptop, (420..890).step_by(60), &[0, 4]);
-    assert!(seen[2] > 5_000, "too little seen of the laptop: {seen:?}");
+    assert!(seen[2] > 5_000, "too few visible pixels of the laptop: {seen:?}");
 }
 
-/// Distance of a point from a triangle.
+/// Returns the distance of a point from a triangle.
 fn distance(p: &Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
     let to_edge = |a: Vec3, b: Vec3| {
         let share = (p - a).dot(&(b - a)) / (b - a).norm_squared().max(1e-12);
@@ -66,7 +66,7 @@ fn distance(p: &Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
     to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
 }
 
-/// Distance of the camera from the nearest surface of anyone at `time`.
+/// Returns the distance of the camera from the nearest surface of any actor at `time`.
 fn clearance(world: &World, time: f64) -> f32 {
     let camera: Vec3 = world.path.pose(time).translation.vector.cast();
     let (mesh, _) = world.actors.at(time, &Lights::default());
@@ -75,7 +75,7 @@ fn clearance(world: &World, time: f64) -> f32 {
 }
 
 #[test]
-fn nobody_in_the_suite_and_nothing_they_move_comes_nearer_to_the_camera_than_35_cm() {
+fn no_person_or_moved_object_of_the_suite_comes_closer_to_the_camera_than_35_cm() {
     assert_eq!(distance(&Vec3::new(0.2, 0.2, 0.3), [Vec3::zeros(), Vec3::x(), Vec3::y()]), 0.3);
     assert_eq!(distance(&Vec3::new(-3.0, 0.5, 4.0), [Vec3::zeros(), Vec3::x(), Vec3::y()]), 5.0);
     let more =
@@ -83,7 +83,7 @@ fn nobody_in_the_suite_and_nothing_they_move_comes_nearer_to_the_camera_than_35_
     let specs = crate::names().into_iter().chain(more);
     for spec in specs {
         let forms = ["seed=1", "seed=2&frames=60"];
-        // Elsewhere nobody's way depends on the camera's, and one seed will do.
+        // Elsewhere the routes do not depend on the path of the camera, and one seed suffices.
         let forms = if spec.starts_with("corridor") { &forms[..] } else { &forms[..1] };
         for form in forms {
             let spec = format!("{spec}{}{form}", if spec.contains('?') { '&' } else { '?' });
@@ -97,7 +97,7 @@ fn nobody_in_the_suite_and_nothing_they_move_comes_nearer_to_the_camera_than_35_
 }
 
 #[test]
-fn people_cover_a_twentieth_of_the_picture_in_every_world_of_the_suite() {
+fn people_cover_a_twentieth_of_the_image_in_every_world_of_the_suite() {
     for name in crate::names() {
         for form in ["seed=1&frames=150", "seed=2"] {
             let world = World::new(&crate::parse(&format!("{name}?{form}")).unwrap()).unwrap();

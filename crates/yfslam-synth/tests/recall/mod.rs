@@ -1,7 +1,6 @@
-//! How well the official detector finds synthetic people. In: worlds. Out: counts of visible people and of found ones, per
-//! circumstance. A person counts if the box of the visible pixels is taller than 30 % of the picture, and is found if a
-//! detection of class `person` with a score of at least 0.3 overlaps that box with an IoU of at least 0.5; each detection
-//! finds one person.
+//! Measures how many synthetic people the official detector finds. In: worlds. Out: the numbers of visible and of found people, per
+//! condition. A person counts if the box of the visible pixels is taller than 30 % of the image, and is found if a detection of
+//! class `person` with a score of at least 0.3 overlaps that box with an IoU of at least 0.5; each detection finds one person.
 #![allow(dead_code, clippy::unwrap_used, reason = "shared by a test and an example, of which each uses a part")]
 
 use std::collections::BTreeMap;
@@ -11,12 +10,12 @@ use yfslam::{BoundingBox, Detection, Detector};
 use yfslam_detect::{DetectorConfig, YoloFastestV2};
 use yfslam_synth::{SynthFrame, World};
 
-/// Least height of a person, relative to the picture.
+/// Least height of a person, relative to the image.
 pub const TALL: f32 = 0.3;
 /// Least overlap.
 pub const IOU: f32 = 0.5;
 
-/// The official model if the data folder has it.
+/// Returns the official model if the data folder has it.
 pub fn official_detector() -> Option<YoloFastestV2> {
     let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let data = std::env::var_os("YFSLAM_DATA").map_or(beside, PathBuf::from);
@@ -37,7 +36,7 @@ pub struct VisiblePerson {
 }
 
 impl VisiblePerson {
-    /// Under which circumstances the person is seen; one of distance, one of truncation.
+    /// Returns the conditions of the person: one of distance, one of truncation.
     pub fn circumstances(&self, width: f32, height: f32) -> [&'static str; 2] {
         let b = &self.bbox;
         let distance = match self.nearest_m {
@@ -57,7 +56,7 @@ impl VisiblePerson {
     }
 }
 
-/// Everyone tall enough in `shot`, with whether `detections` find them.
+/// Returns all people in `shot` who are tall enough, and whether `detections` find them.
 pub fn visible_people(shot: &SynthFrame, detections: &[Detection]) -> Vec<VisiblePerson> {
     let height = shot.instances.height() as f32;
     let mut pairs = Vec::new();
@@ -92,7 +91,7 @@ pub fn visible_people(shot: &SynthFrame, detections: &[Detection]) -> Vec<Visibl
     people.iter().zip(found).map(visible_person).collect()
 }
 
-/// People seen and people found.
+/// Numbers of visible people and of found ones.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Count {
     pub seen: usize,
@@ -106,16 +105,16 @@ impl Count {
         self.found += usize::from(found);
     }
 
-    /// Share found; 1 if there was nobody.
+    /// Returns the share that was found; 1 without people.
     pub fn recall(&self) -> f64 {
         if self.seen == 0 { 1.0 } else { self.found as f64 / self.seen as f64 }
     }
 }
 
-/// Counts per world and per circumstance.
+/// Counts per world and per condition.
 pub type Table = BTreeMap<String, Count>;
 
-/// Adds the visible_people of every `step`-th frame to `table`; `each` sees every frame.
+/// Adds the visible people of every `step`-th frame to `table`; `each` is called for every frame.
 pub fn measure(
     world: &World,
     name: &str,
