@@ -11,7 +11,7 @@ use crate::yolo::YoloFastestV2;
 /// YOLO network. `name` stands for the file in error messages.
 ///
 /// # Errors
-/// As [`YoloFastestV2::load`].
+/// As for [`YoloFastestV2::load`].
 pub fn load(name: &str, bytes: &[u8], config: &DetectorConfig) -> Result<Box<dyn Network>, ModelError> {
     match YoloFastestV2::from_bytes(name, bytes, config) {
         #[cfg(feature = "rten")]

@@ -3,7 +3,7 @@
 use yfslam::Detector;
 use yfslam::image::Image;
 
-/// A network that finds objects and, if it segments, says which pixels show which of them.
+/// A detection network, which may also segment the objects.
 pub trait Network: Detector {
     /// Returns the object that each pixel of the last image shows: 0 for none, else 1 + its index in the output of
     /// [`Detector::detect`]; where objects overlap, the one with the highest score. `None` from networks without masks.

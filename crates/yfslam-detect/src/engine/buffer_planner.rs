@@ -1,15 +1,15 @@
-//! Where each plane lies: planes whose last reader has run give their memory to later ones, so that the working set stays in
-//! the second-level cache.
+//! Plans the buffer of each plane: planes whose last reader has run give their memory to later ones, so that the working set stays
+//! in the second-level cache.
 
 use crate::engine::graph::{Network, Plane};
 use crate::engine::kernels::WIDEST;
 use crate::engine::kernels::depthwise::ROWS;
 
-/// Hands out memory in the order of execution.
+/// Assigns memory in the order of execution.
 #[derive(Debug)]
 pub(crate) struct BufferPlanner<'n> {
     network: &'n Network,
-    /// Time (index of the layer) at which each plane is read last.
+    /// Time (index of the layer) of the last read of each plane.
     last_read: Vec<usize>,
     /// Offset of each plane, floats.
     offsets: Vec<usize>,
@@ -35,8 +35,8 @@ impl<'n> BufferPlanner<'n> {
         Self { network, last_read, offsets: vec![0; network.planes.len()], live: Vec::new(), end: 0 }
     }
 
-    /// BufferPlanner `planes` (of equal size), which are written at `time`, and `padding` more that nobody reads. Returns the offsets of
-    /// all.
+    /// Assigns memory to `planes` (of equal size), which are written at `time`, and to `padding` more planes that are never read.
+    /// Returns all offsets.
     pub(crate) fn planes(&mut self, planes: &[Plane], padding: usize, time: usize) -> Vec<usize> {
         let stride = stride(self.network.planes[planes[0]]);
         let last_read = planes.iter().map(|plane| self.last_read[*plane]).max().unwrap_or(time);
@@ -45,17 +45,17 @@ impl<'n> BufferPlanner<'n> {
         (0..planes.len() + padding).map(|index| start + index * stride).collect()
     }
 
-    /// Offsets of planes placed before.
+    /// Returns the offsets of planes that have memory.
     pub(crate) fn offsets(&self, planes: &[Plane]) -> Vec<usize> {
         planes.iter().map(|plane| self.offsets[*plane]).collect()
     }
 
-    /// Floats needed in all.
+    /// Returns the number of floats that are needed in total.
     pub(crate) fn end(&self) -> usize {
         self.end
     }
 
-    /// The first gap that is large enough.
+    /// Takes the first gap that is large enough.
     fn block(&mut self, floats: usize, time: usize, last_read: usize) -> usize {
         self.live.retain(|block| block.last_read >= time);
         let mut start = 0;
@@ -71,8 +71,8 @@ impl<'n> BufferPlanner<'n> {
     }
 }
 
-/// Floats from one plane to the next: room for vectors that reach past the last row and for rows written in blocks, and an odd
-/// number of cache lines, so that equal positions of neighbouring planes fall into different sets of the cache.
+/// Returns the number of floats from one plane to the next: room for vectors that reach past the last row and for rows written in
+/// blocks, and an odd number of cache lines, so that equal positions of neighbouring planes fall into different sets of the cache.
 pub(crate) fn stride((height, width): (usize, usize)) -> usize {
     let whole = (height * width).next_multiple_of(WIDEST);
     let rows = (height.max(ROWS) - 1) * width + width.next_multiple_of(WIDEST);

@@ -1,4 +1,4 @@
-//! Floats that start on a cache line, so that vectors do not straddle two.
+//! A buffer of floats that starts on a cache line, so that no vector straddles two lines.
 
 use std::ops::{Deref, DerefMut};
 
@@ -8,7 +8,7 @@ const LINE: usize = 64;
 /// A slice of floats, zero at first, aligned to a cache line.
 #[derive(Debug)]
 pub(crate) struct Memory {
-    /// Never grows, so the start stays where it is.
+    /// It never grows, so that the start stays valid.
     floats: Vec<f32>,
     start: usize,
     length: usize,

@@ -1,4 +1,4 @@
-//! The network placed in memory: a list of steps with all offsets fixed. Nothing is allocated when it runs.
+//! A network with a fixed place in memory: a list of steps with all offsets fixed. Running it allocates nothing.
 
 use fearless_simd::Level;
 
@@ -10,7 +10,7 @@ use crate::engine::kernels::{WIDEST, depthwise, stem, upsample};
 use crate::engine::memory::Memory;
 use crate::error::ModelError;
 
-/// Largest working memory, floats (1 GiB); the real network needs about 1 % of it.
+/// Largest working memory, floats (1 GiB); the embedded network needs about 1 % of it.
 const MAX_MEMORY: usize = 1 << 28;
 
 /// A network ready to run.
@@ -19,9 +19,9 @@ pub(crate) struct Plan {
     pub(crate) level: Level,
     /// All planes.
     memory: Memory,
-    /// For the step that runs.
+    /// Scratch memory of the running step.
     scratch: Memory,
-    /// For the step that runs, if it computes in integers.
+    /// Scratch memory of the running step, if it computes with integers.
     words: Vec<i32>,
     steps: Vec<Step>,
     input: Vec<usize>,
@@ -57,11 +57,12 @@ enum Operation {
 }
 
 impl Plan {
-    /// BufferPlanner `network`, which computes in integers what it can if `integers` says so; `name` is what errors call it.
+    /// Plans `network`, which computes with integers where possible if `integers` is set; `name` stands for the file in error
+    /// messages.
     pub(crate) fn new(name: &str, network: Network, level: Level, integers: bool) -> Result<Self, ModelError> {
         if integers && network.layers.iter().all(|layer| layer.scale.is_none()) {
             let what =
-                "it does not say how to compute with integers (`integers`); `python -m train.quantize` measures that";
+                "it has no scales for computing with integers (`integers`); add them with `python -m train.quantize`";
             return Err(ModelError::Mismatch { model: name.into(), what: what.into() });
         }
         let mut buffers = BufferPlanner::new(&network);
@@ -73,7 +74,8 @@ impl Plan {
         let words = steps.iter().map(|step| step.operation.words()).max().unwrap_or(0);
         if buffers.end() + scratch > MAX_MEMORY {
             let mebibytes = (buffers.end() + scratch) >> 18;
-            let what = format!("the network needs {mebibytes} MiB of working memory; it is no small detector");
+            let what =
+                format!("the network needs {mebibytes} MiB of working memory, more than 1 GiB; use a smaller network");
             return Err(ModelError::Mismatch { model: name.into(), what });
         }
         let map = |(name, planes): &(String, Vec<usize>)| Map {
@@ -94,19 +96,19 @@ impl Plan {
         })
     }
 
-    /// The planes of the input, each `height · width` floats, to be filled before [`Plan::run`].
+    /// Returns the planes of the input, each `height · width` floats, to be filled before [`Plan::run`].
     pub(crate) fn input_mut(&mut self) -> [&mut [f32]; 3] {
         let length = self.input_size.0 * self.input_size.1;
         let ranges = [0, 1, 2].map(|plane| self.input[plane]..self.input[plane] + length);
         self.memory.get_disjoint_mut(ranges).unwrap_or_default()
     }
 
-    /// One plane of an output.
+    /// Returns one plane of an output.
     pub(crate) fn plane(&self, map: &Map, plane: usize) -> &[f32] {
         &self.memory[map.planes[plane]..][..map.size.0 * map.size.1]
     }
 
-    /// The forward pass.
+    /// Runs the forward pass.
     pub(crate) fn run(&mut self) {
         let (level, memory, scratch) = (self.level, &mut self.memory[..], &mut self.scratch[..]);
         for Step { operation, inputs, outputs } in &self.steps {
@@ -133,7 +135,7 @@ impl Plan {
 }
 
 impl Operation {
-    /// What computes `layer`, whose inputs have `size`.
+    /// Creates the operation of `layer`, whose inputs have `size`.
     fn new(layer: &Layer, size: (usize, usize), buffers: &BufferPlanner, integers: bool) -> Self {
         let addend = |rows: usize| {
             let mut addend = buffers.offsets(&layer.addend);
@@ -170,7 +172,7 @@ impl Operation {
         }
     }
 
-    /// Floats of scratch memory.
+    /// Returns the number of floats of scratch memory.
     fn scratch(&self) -> usize {
         match self {
             Operation::Stem { geometry, .. } => geometry.scratch,
@@ -179,7 +181,7 @@ impl Operation {
         }
     }
 
-    /// Words of scratch memory for integers.
+    /// Returns the number of words of scratch memory for integers.
     fn words(&self) -> usize {
         match self {
             Operation::Integers { matrix, length, .. } => matrix.scratch(*length),
@@ -187,7 +189,7 @@ impl Operation {
         }
     }
 
-    /// Rows that are written beyond those of the layer.
+    /// Returns the number of rows that are written beyond those of the layer.
     fn padding(&self, rows: usize) -> usize {
         match self {
             Operation::Pointwise { matrix, .. } => matrix.padded_rows() - rows,
@@ -197,7 +199,7 @@ impl Operation {
     }
 }
 
-/// BufferPlanner the outputs of the layer that runs at `time`.
+/// Creates the step of the layer that runs at `time` and assigns memory to its outputs.
 fn step(network: &Network, layer: &Layer, time: usize, buffers: &mut BufferPlanner, integers: bool) -> Step {
     let operation = Operation::new(layer, network.planes[layer.inputs[0]], buffers, integers);
     let padding = operation.padding(layer.outputs.len());

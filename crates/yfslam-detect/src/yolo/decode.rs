@@ -1,8 +1,7 @@
-//! Raw maps in, boxes out: anchors, sigmoid and softmax, then non-maximum suppression and fusion within each class.
+//! Decodes raw outputs into boxes: anchors, sigmoid and softmax, then non-maximum suppression and fusion within each class.
 //!
-//! With σ the sigmoid, cell (gx, gy), anchor (aw, ah) and stride s, all px of the network input:
-//! centre x = (2σ(tx) − ½ + gx) · s, width = (2σ(tw))² · aw, y and height alike; score = σ(objectness) · softmax(classes). The class
-//! map is shared by the anchors of a cell.
+//! With σ the sigmoid, cell (gx, gy), anchor (aw, ah) and stride s, all px of the network input: centre x = (2σ(tx) − ½ + gx) · s,
+//! width = (2σ(tw))² · aw, y and height alike; score = σ(objectness) · softmax(classes). The anchors of a cell share the class map.
 
 use yfslam::{BoundingBox, Detection};
 
@@ -21,7 +20,8 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Sorts the network's outputs into grids, fine to coarse, one for each list of `anchors`. Also returns the number of classes.
+    /// Sorts the outputs of the network into grids, fine to coarse, one for each list of `anchors`. Also returns the number of
+    /// classes.
     pub(crate) fn find(name: &str, plan: &Plan, anchors: &[Vec<[f32; 2]>]) -> Result<(Vec<Self>, usize), ModelError> {
         let mismatch = |what: String| ModelError::Mismatch { model: name.into(), what };
         let mut sizes: Vec<(usize, usize)> = plan.outputs.iter().map(|map| map.size).collect();
@@ -62,7 +62,7 @@ impl Grid {
         Ok((grids, class_count.unwrap_or(0)))
     }
 
-    /// How many boxes [`Grid::candidates`] can find.
+    /// Returns the largest number of boxes of [`Grid::candidates`].
     pub(crate) fn most_candidates(&self, plan: &Plan) -> usize {
         let (height, width) = plan.outputs[self.maps[0]].size;
         height * width * self.anchors.len()
@@ -71,7 +71,7 @@ impl Grid {
     /// Appends every box whose score exceeds `threshold`, px of the network input, to `out`.
     pub(crate) fn candidates(&self, plan: &Plan, threshold: f32, out: &mut Vec<Detection>) {
         let [boxes, objects, classes] = self.maps.map(|index| &plan.outputs[index]);
-        // σ(x) > t is x > ln(t / (1 − t)): no exponential for the many cells that hold nothing.
+        // σ(x) > t is x > ln(t / (1 − t)): this avoids the exponential for the many empty cells.
         let least = (threshold / (1.0 - threshold)).ln();
         for (index, anchor) in self.anchors.iter().enumerate() {
             for (cell, object) in plan.plane(objects, index).iter().enumerate() {
@@ -96,7 +96,7 @@ impl Grid {
     }
 }
 
-/// The most likely class of a cell and its softmax probability.
+/// Returns the most likely class of a cell and its softmax probability.
 fn best_class(plan: &Plan, classes: &Map, cell: usize) -> (usize, f32) {
     let logits = || (0..classes.planes.len()).map(|class| plan.plane(classes, class)[cell]);
     let (mut best, mut most) = (0, f32::NEG_INFINITY);
@@ -112,7 +112,7 @@ fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + (-x).exp())
 }
 
-/// Moves the best candidates to `out`, best first, leaving out those that overlap a better one of their class.
+/// Moves the best candidates to `out`, best first, except those that overlap a better one of their class.
 pub(crate) fn suppress(candidates: &mut [Detection], config: &DetectorConfig, out: &mut Vec<Detection>) {
     let corner = |a: &Detection| [a.bbox.x_min, a.bbox.y_min];
     candidates.sort_unstable_by(|a, b| {
@@ -129,7 +129,7 @@ pub(crate) fn suppress(candidates: &mut [Detection], config: &DetectorConfig, ou
     }
 }
 
-/// Replaces each box of `kept` by the mean of the `candidates` that agree with it, weighed by their scores.
+/// Replaces each box of `kept` by the mean of the `candidates` that agree with it, weighted by their scores.
 pub(crate) fn fuse(candidates: &[Detection], config: &DetectorConfig, kept: &mut [Detection]) {
     for found in kept {
         let agrees = |other: &&Detection| other.class == found.class && other.bbox.iou(&found.bbox) > config.fuse_iou;

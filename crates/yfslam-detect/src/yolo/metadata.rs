@@ -4,7 +4,7 @@ use super::coco::COCO_NAMES;
 use crate::config::DetectorConfig;
 use crate::engine::onnx::Model;
 
-/// The names of a model's classes: those configured, else its own, else those of COCO.
+/// Returns the names of the classes: those of the configuration, else those of the model, else those of COCO.
 pub(crate) fn class_names(model: &Model, config: &DetectorConfig, classes: usize) -> Result<Vec<String>, String> {
     let names = match model.metadata.get("names") {
         _ if !config.class_names.is_empty() => config.class_names.clone(),
@@ -19,7 +19,7 @@ pub(crate) fn class_names(model: &Model, config: &DetectorConfig, classes: usize
     }
 }
 
-/// Class names in a model's metadata: `{0: 'person', 1: 'chair'}`, `["person", "chair"]` or `person, chair`.
+/// Parses class names in the metadata of a model: `{0: 'person', 1: 'chair'}`, `["person", "chair"]` or `person, chair`.
 pub(crate) fn parse_names(text: &str) -> Vec<String> {
     let inner = text.trim().trim_matches(['{', '}', '[', ']']);
     let name = |entry: &str| {
@@ -29,7 +29,7 @@ pub(crate) fn parse_names(text: &str) -> Vec<String> {
     inner.split(',').map(name).filter(|name| !name.is_empty()).collect()
 }
 
-/// Anchors in a model's metadata: widths and heights in pairs, six pairs, whatever brackets and commas stand between.
+/// Parses anchors in the metadata of a model: six pairs of width and height with any brackets and commas.
 pub(super) fn parse_anchors(text: &str) -> Option<Vec<Vec<[f32; 2]>>> {
     let numbers = text.split(|c: char| !(c.is_ascii_digit() || c == '.')).filter(|word| !word.is_empty());
     let numbers: Vec<f32> = numbers.map(|word| word.parse().ok().filter(|side| *side > 0.0)).collect::<Option<_>>()?;

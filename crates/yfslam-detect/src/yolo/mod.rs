@@ -1,4 +1,4 @@
-//! YOLO-FastestV2 behind the core's `Detector` trait: model file and image in, boxes out.
+//! YOLO-FastestV2 as a `Detector`. In: a model file and images. Out: detections.
 
 pub(crate) mod coco;
 pub(crate) mod decode;
@@ -22,8 +22,8 @@ use decode::{Grid, fuse, suppress};
 use metadata::{class_names, parse_anchors};
 use preprocess::Stretch;
 
-/// The detector network, loaded and ready. It runs on the calling thread and, once the first image of a size has passed, allocates
-/// nothing but what the caller's list needs to grow.
+/// The detector network, ready to run. It runs on the calling thread and, after the first image of a size, allocates nothing except
+/// for the growth of the output list.
 #[derive(Debug)]
 pub struct YoloFastestV2 {
     plan: Plan,
@@ -34,7 +34,7 @@ pub struct YoloFastestV2 {
     candidates: Vec<Detection>,
 }
 
-/// One output of the network as it leaves the last convolution, for verification.
+/// One output of the network after the last convolution, for verification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawOutput {
     /// Name in the model file.
@@ -46,20 +46,20 @@ pub struct RawOutput {
 }
 
 impl YoloFastestV2 {
-    /// Reads an ONNX file.
+    /// Loads an ONNX file.
     ///
     /// # Errors
-    /// If the file cannot be read, is no ONNX model, holds another architecture, or does not fit `config`.
+    /// The file cannot be read, is not an ONNX model, has another architecture, or does not fit `config`.
     pub fn load(path: &Path, config: &DetectorConfig) -> Result<Self, ModelError> {
         let name = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|source| ModelError::Io { path: name.clone(), source })?;
         Self::from_bytes(&name, &bytes, config)
     }
 
-    /// Reads the contents of an ONNX file; `name` is what errors call it.
+    /// Loads a network from the contents of an ONNX file; `name` stands for the file in error messages.
     ///
     /// # Errors
-    /// As [`YoloFastestV2::load`].
+    /// As for [`YoloFastestV2::load`].
     pub fn from_bytes(name: &str, bytes: &[u8], config: &DetectorConfig) -> Result<Self, ModelError> {
         let mismatch = |what: String| ModelError::Mismatch { model: name.into(), what };
         config.check().map_err(mismatch)?;
@@ -81,22 +81,22 @@ impl YoloFastestV2 {
         Ok(Self { plan, grids, config, class_names, stretch: Stretch::default(), candidates })
     }
 
-    /// Uses the instruction set `level` instead of the best one, to compare and to test.
+    /// Selects the instruction set `level` instead of the best one, for comparisons and tests.
     #[must_use]
     pub fn with_level(mut self, level: Level) -> Self {
         self.plan.level = level;
         self
     }
 
-    /// Height and width of the network input, px.
+    /// Returns the height and width of the network input, px.
     pub fn input_size(&self) -> (usize, usize) {
         self.plan.input_size
     }
 
-    /// The forward pass alone on `[3, height, width]` values: blue, green, red, each in [0, 1].
+    /// Runs only the forward pass on `[3, height, width]` values: blue, green, red, each in [0, 1].
     ///
     /// # Errors
-    /// If `input` has another length.
+    /// `input` has another length.
     pub fn forward(&mut self, input: &[f32]) -> Result<(), DetectorError> {
         let (height, width) = self.plan.input_size;
         if input.len() != 3 * height * width {
@@ -109,7 +109,7 @@ impl YoloFastestV2 {
         Ok(())
     }
 
-    /// The raw outputs of the last image or forward pass, in the order of the model file.
+    /// Returns the raw outputs of the last image or forward pass, in the order of the model file.
     pub fn raw_outputs(&self) -> Vec<RawOutput> {
         let output = |map: &Map| RawOutput {
             name: map.name.clone(),

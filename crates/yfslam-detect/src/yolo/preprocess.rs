@@ -1,17 +1,19 @@
-//! Image in, network input out: plain bilinear stretch (no letterbox) with half-pixel centres, planes blue, green, red in [0, 1].
+//! Converts an image to the network input: bilinear stretch (no letterbox) with half-pixel centres, planes blue, green, red in [0,
+//! 1].
 //!
 //! Definition: output column x samples the input at (x + ½) · width_in / width_out − ½, clamped to the outermost pixel centres, and
-//! rows alike; all in f32 without rounding to 8 bit. This is what OpenCV's `resize` with `INTER_LINEAR` gives on a float image.
+//! rows likewise; all in f32 without rounding to 8 bits. This is the result of OpenCV's `resize` with `INTER_LINEAR` on a float
+//! image.
 
 use fearless_simd::{Level, dispatch};
 use yfslam::image::RgbImage;
 
-/// Keeps the sampling positions of the last image size.
+/// The sampling positions of the last image size.
 #[derive(Debug, Default)]
 pub(crate) struct Stretch {
     sizes: (usize, usize),
     columns: Vec<Sample>,
-    /// A row of the input, interpolated between two rows, its last pixel doubled.
+    /// A row of the input, interpolated between two rows, with its last pixel repeated.
     line: Vec<[f32; 3]>,
 }
 
@@ -60,7 +62,7 @@ impl Stretch {
     }
 }
 
-/// `line` = (upper · (1 − fraction) + lower · fraction) / 255.
+/// Computes `line` = (upper · (1 − fraction) + lower · fraction) / 255.
 #[inline(always)]
 fn blend(upper: &[u8], lower: &[u8], fraction: f32, line: &mut [f32]) {
     for ((value, upper), lower) in line.iter_mut().zip(upper).zip(lower) {

@@ -1,4 +1,4 @@
-//! The operators that pick channels: they pass planes on and compute nothing.
+//! Operators that select channels: they pass planes on without computation.
 
 use super::lower::{Lowering, Step};
 use super::view::View;

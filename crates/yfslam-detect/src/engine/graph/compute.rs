@@ -1,4 +1,4 @@
-//! The operators that compute: each becomes a layer or is folded into the layer before it.
+//! Operators that compute: each becomes a layer or is folded into the layer before it.
 
 use super::lower::{Lowering, MAX_SIDE, Step};
 use super::view::{MAX_PLANES, View};
@@ -52,7 +52,7 @@ impl<'m> Lowering<'m> {
         Ok(view)
     }
 
-    /// The layer whose whole output is input 0 of `node` and that nothing else reads.
+    /// Returns the layer whose whole output is input 0 of `node` and has no other reader.
     fn producer(&mut self, node: &Node<'m>) -> Step<&mut Layer> {
         let value = node.inputs.first().copied().unwrap_or_default();
         let layer = self.producers.get(value).filter(|_| self.uses.get(value) == Some(&1));

@@ -1,8 +1,8 @@
-//! Algebra on the lowered network that saves multiplications and changes results by rounding only.
+//! Algebraic simplifications of the lowered network, which save multiplications and change results by rounding only.
 
 use super::{Kind, Layer, Network};
 
-/// Two 1×1 convolutions without a ReLU in between are one: W₂(W₁x + b₁) + b₂ = (W₂W₁)x + (W₂b₁ + b₂).
+/// Merges two 1×1 convolutions without a ReLU in between: W₂(W₁x + b₁) + b₂ = (W₂W₁)x + (W₂b₁ + b₂).
 pub(crate) fn fold_linear_pointwise(network: &mut Network) {
     for index in (0..network.layers.len()).rev() {
         let first = &network.layers[index];
@@ -48,8 +48,8 @@ fn prepend(second: &mut Layer, first: &Layer) {
     second.scale = first.scale;
 }
 
-/// A 1×1 convolution commutes with nearest upsampling, so its part over upsampled planes runs at the small size:
-/// W·[up(a), b] = up(Wₐ·a) + W_b·b.
+/// Moves 1×1 convolutions before nearest upsampling, with which they commute, so that they run at the small size: W·[up(a), b] =
+/// up(Wₐ·a) + W_b·b.
 pub(crate) fn defer_upsampling(network: &mut Network) {
     for index in (0..network.layers.len()).rev() {
         let up = &network.layers[index];

@@ -1,4 +1,4 @@
-//! ONNX nodes in, fused layers out; whatever is not part of YOLO-FastestV2 is refused by name.
+//! Lowers ONNX nodes to fused layers; nodes that are not part of YOLO-FastestV2 are refused by name.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::error::ModelError;
 /// Largest side of the network input and of any plane, px.
 pub(super) const MAX_SIDE: usize = 2048;
 
-/// Lowers the graph of `model` and folds what can be folded; `name` is what errors call it.
+/// Lowers the graph of `model` and simplifies it; `name` stands for the file in error messages.
 pub(crate) fn lower(name: &str, model: &Model) -> Result<Network, ModelError> {
     let mut lowering = Lowering::new(name, model)?;
     for node in &model.nodes {
@@ -31,11 +31,11 @@ pub(super) struct Lowering<'m> {
     model: &'m Model<'m>,
     constants: BTreeMap<&'m str, Tensor>,
     views: BTreeMap<&'m str, View>,
-    /// How what each convolution reads may be stored in bytes, by the node's name.
+    /// Scale of the input of each convolution in bytes, by the name of the node.
     pub(super) scales: BTreeMap<&'m str, Scale>,
-    /// How often each value is read.
+    /// Number of readers of each value.
     pub(super) uses: BTreeMap<&'m str, usize>,
-    /// The layer that each value comes from, for values that are a layer's whole result.
+    /// The layer of each value, for values that are the whole result of a layer.
     pub(super) producers: BTreeMap<&'m str, usize>,
     pub(super) network: Network,
 }
@@ -153,13 +153,13 @@ impl<'m> Lowering<'m> {
         }
     }
 
-    /// A float constant with finite values and `dims`' number of dimensions.
+    /// Returns a float constant with finite values and as many dimensions as `dims`.
     pub(super) fn floats(&self, node: &Node<'m>, index: usize) -> Step<(&[usize], &[f32])> {
         let (name, tensor) = self.tensor(node, index)?;
         match &tensor.data {
             TensorData::Floats(values) if values.iter().all(|value| value.is_finite()) => Ok((&tensor.dims, values)),
             TensorData::Floats(_) => {
-                Err(format!("constant \"{name}\" holds values that are not finite; the training diverged"))
+                Err(format!("constant \"{name}\" has values that are not finite; the training diverged"))
             }
             TensorData::External => {
                 Err(format!("constant \"{name}\" lies in another file; export everything into one"))
@@ -189,7 +189,7 @@ impl<'m> Lowering<'m> {
         Ok(())
     }
 
-    /// A constant stored in fewer bits than it is used in: floats were widened when they were read.
+    /// Passes on a constant that is stored with fewer bits; floats were widened when they were read.
     fn cast(&mut self, node: &'m Node<'m>) -> Step<()> {
         if node.int("to", 0) != FLOAT {
             return Err("only constants can change their type, to float32".into());
@@ -201,7 +201,7 @@ impl<'m> Lowering<'m> {
     }
 }
 
-/// Scales in a model's metadata: on each line the name of a convolution, the step and the zero of what it reads.
+/// Parses the scales in the metadata of a model: on each line the name of a convolution, and the step and the zero of its input.
 fn scales<'m>(model: &Model<'m>) -> Step<BTreeMap<&'m str, Scale>> {
     let scale = |line: &'m str| {
         let mut words = line.rsplitn(3, ' ');

@@ -1,7 +1,7 @@
-//! From an ONNX graph to a short list of fused layers over planes.
+//! Converts an ONNX graph to a short list of fused layers over planes.
 //!
-//! A *plane* is one channel of one activation, `height × width` floats. A layer reads any list of planes and writes new
-//! ones, so concatenation, channel split and channel shuffle are list operations at load time and cost nothing per frame.
+//! A *plane* is one channel of one activation, `height × width` floats. A layer reads any list of planes and writes new ones, so
+//! that concatenation, channel split and channel shuffle are list operations at load time and cost nothing per frame.
 
 mod channels;
 mod compute;
@@ -16,7 +16,7 @@ use crate::engine::kernels::integers::Scale;
 /// Index into [`Network::planes`].
 pub(crate) type Plane = usize;
 
-/// The network after lowering, sizes known, nothing placed in memory yet.
+/// The network after lowering, with all sizes known and without memory.
 #[derive(Debug, Default)]
 pub(crate) struct Network {
     /// Height and width of every plane, px.
@@ -32,7 +32,7 @@ pub(crate) struct Network {
 /// One step of the forward pass.
 #[derive(Debug)]
 pub(crate) struct Layer {
-    /// Node of the graph that it came from.
+    /// Name of its node in the graph.
     pub(crate) name: String,
     pub(crate) kind: Kind,
     pub(crate) inputs: Vec<Plane>,
@@ -45,14 +45,14 @@ pub(crate) struct Layer {
     pub(crate) relu: bool,
     /// Planes added to the outputs before ReLU, one per output; mostly empty.
     pub(crate) addend: Vec<Plane>,
-    /// How the inputs may be stored in bytes, if the model file tells.
+    /// Scale of the inputs in bytes, if the model file has one.
     pub(crate) scale: Option<Scale>,
 }
 
-/// What a layer computes.
+/// Operation of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Convolution 3×3, stride 2, padding 1, over all inputs, not yet joined with its pool.
+    /// Convolution 3×3, stride 2, padding 1, over all inputs, before it is joined with its pool.
     Dense,
     /// [`Kind::Dense`] with ReLU, then max pool 3×3, stride 2, padding 1.
     Stem,
@@ -65,20 +65,20 @@ pub(crate) enum Kind {
 }
 
 impl Network {
-    /// New planes of equal size.
+    /// Adds planes of equal size.
     fn new_planes(&mut self, count: usize, size: (usize, usize)) -> Vec<Plane> {
         let first = self.planes.len();
         self.planes.resize(first + count, size);
         (first..first + count).collect()
     }
 
-    /// Layers that read plane `plane`.
+    /// Returns the layers that read plane `plane`.
     fn readers(&self, plane: Plane) -> impl Iterator<Item = usize> {
         let reads = move |layer: &Layer| layer.inputs.contains(&plane) || layer.addend.contains(&plane);
         self.layers.iter().enumerate().filter(move |(_, layer)| reads(layer)).map(|(index, _)| index)
     }
 
-    /// Whether plane `plane` leaves the network.
+    /// Returns whether plane `plane` is an output of the network.
     fn is_output(&self, plane: Plane) -> bool {
         self.outputs.iter().any(|(_, planes)| planes.contains(&plane))
     }

@@ -1,15 +1,15 @@
-//! A tensor as a list of planes with a shape; ONNX's reshaping operators move planes about, never floats.
+//! A tensor as a list of planes with a shape; the reshaping operators of ONNX move planes and never floats.
 
 use super::Plane;
 
-/// More channels than this are no detector; the bound keeps a hostile graph from filling the memory.
+/// Largest number of channels, which keeps a malicious graph from filling the memory.
 pub(crate) const MAX_PLANES: usize = 4096;
 
 /// `dims` = leading dimensions (their product is the number of planes) followed by `[height, width]` or `[height · width]`.
 #[derive(Clone, Debug)]
 pub(crate) struct View {
     pub(crate) dims: Vec<usize>,
-    /// How many of the last dimensions lie within a plane, 1 or 2.
+    /// Number of the last dimensions that lie within a plane, 1 or 2.
     pub(crate) inner: usize,
     pub(crate) size: (usize, usize),
     pub(crate) planes: Vec<Plane>,
@@ -18,12 +18,12 @@ pub(crate) struct View {
 type Outcome = Result<View, String>;
 
 impl View {
-    /// `[1, channels, height, width]`.
+    /// Creates a view of shape `[1, channels, height, width]`.
     pub(crate) fn image(planes: Vec<Plane>, size: (usize, usize)) -> Self {
         Self { dims: vec![1, planes.len(), size.0, size.1], inner: 2, size, planes }
     }
 
-    /// Whether this is one image of shape `[1, channels, height, width]` with at least one channel.
+    /// Returns whether this is one image of shape `[1, channels, height, width]` with at least one channel.
     pub(crate) fn is_image(&self) -> bool {
         self.inner == 2 && self.dims.len() == 4 && self.dims[0] == 1 && !self.planes.is_empty()
     }
@@ -32,7 +32,7 @@ impl View {
         &self.dims[..self.dims.len() - self.inner]
     }
 
-    /// A possibly negative axis as an index into the leading dimensions.
+    /// Converts a possibly negative axis to an index of the leading dimensions.
     pub(crate) fn leading_axis(&self, axis: i64) -> Result<usize, String> {
         let absolute = if axis < 0 { axis + self.dims.len() as i64 } else { axis };
         usize::try_from(absolute)
@@ -41,7 +41,7 @@ impl View {
             .ok_or_else(|| format!("axis {axis} of shape {:?} is no channel axis", self.dims))
     }
 
-    /// ONNX `Reshape`: 0 keeps a dimension, −1 follows from the others.
+    /// Applies ONNX `Reshape`: 0 keeps a dimension, −1 follows from the others.
     pub(crate) fn reshape(&self, shape: &[i64]) -> Outcome {
         let failed = || format!("cannot reshape {:?} to {shape:?} by moving whole channels", self.dims);
         let total: usize = self.dims.iter().product();
@@ -70,7 +70,7 @@ impl View {
         Ok(View { dims, inner, ..self.clone() })
     }
 
-    /// ONNX `Transpose` among the leading dimensions.
+    /// Applies ONNX `Transpose` to the leading dimensions.
     pub(crate) fn transpose(&self, perm: &[i64]) -> Outcome {
         let failed = || format!("cannot transpose {:?} by {perm:?}; only channel axes may change places", self.dims);
         let rank = self.dims.len();
@@ -97,7 +97,7 @@ impl View {
         Ok(View { dims, planes, ..self.clone() })
     }
 
-    /// The entries `indices` along `axis`.
+    /// Selects the entries `indices` along `axis`.
     pub(crate) fn select(&self, axis: i64, indices: &[i64]) -> Outcome {
         let axis = self.leading_axis(axis)?;
         let length = self.dims[axis];
@@ -121,7 +121,7 @@ impl View {
         Ok(View { dims, planes, ..self.clone() })
     }
 
-    /// Without the dimensions `axes`, which must be 1.
+    /// Removes the dimensions `axes`, which must be 1.
     pub(crate) fn squeeze(&self, axes: &[i64]) -> Outcome {
         let mut dims: Vec<Option<usize>> = self.dims.iter().copied().map(Some).collect();
         for axis in axes {
@@ -134,7 +134,7 @@ impl View {
         Ok(View { dims, ..self.clone() })
     }
 
-    /// ONNX `Concat` along a leading axis.
+    /// Applies ONNX `Concat` along a leading axis.
     pub(crate) fn concat(views: &[&View], axis: i64) -> Outcome {
         let first = views.first().ok_or("nothing to concatenate")?;
         let axis = first.leading_axis(axis)?;
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_would_tear_a_plane_is_refused() {
+    fn operations_that_split_a_plane_are_refused() {
         let view = image(6);
         assert!(view.reshape(&[1, 12, 2, 5]).is_err());
         assert!(view.reshape(&[-1, 7]).is_err());

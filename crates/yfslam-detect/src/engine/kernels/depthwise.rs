@@ -1,15 +1,15 @@
 //! Depthwise convolution: one square filter per plane, zero padding `kernel / 2`, stride 1 or 2.
 //!
-//! A plane is copied into scratch, its rows set apart by zeros, for stride 2 even columns apart from odd ones. Then the values
-//! that a tap of the filter multiplies for neighbouring outputs are neighbours, too. Vectors may reach past the end of a row of
-//! the output: the next row, written later, mends it, and the last one reaches into room that every plane has.
+//! A plane is copied into scratch memory with its rows separated by zeros and, for stride 2, even columns separated from odd ones.
+//! Then the values that a filter tap multiplies for neighbouring outputs are neighbours, too. Vectors may write past the end of an
+//! output row: the next row, written later, overwrites this, and the last one reaches into room that every plane has.
 #![allow(clippy::needless_range_loop, reason = "iterator adapters are not inlined in every build, index loops are")]
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 
 use super::{WIDEST, load};
 
-/// Output rows computed together, so that an input row that was loaded serves several of them.
+/// Output rows that are computed together, so that a loaded input row serves several of them.
 pub(crate) const ROWS: usize = 6;
 
 /// Sizes that follow from those of the input, the kernel and the stride.
@@ -22,12 +22,12 @@ pub(crate) struct Geometry {
     /// Floats from one part of a scratch row (all columns; or the even, then the odd ones) to the next: [`WIDEST`] zeros, the
     /// values, zeros up to a multiple of [`WIDEST`].
     part: usize,
-    /// Where in a scratch row the values lie that each column of the filter multiplies for output 0.
+    /// Place in a scratch row of the values that each column of the filter multiplies for output 0.
     columns: Vec<usize>,
 }
 
 impl Geometry {
-    /// For planes of `height × width`; `kernel` is 3 or 5, `stride` 1 or 2.
+    /// Computes the geometry for planes of `height × width`; `kernel` is 3 or 5, `stride` 1 or 2.
     pub(crate) fn new((height, width): (usize, usize), kernel: usize, stride: usize) -> Self {
         let pad = kernel / 2;
         let part = WIDEST + width.div_ceil(stride).next_multiple_of(WIDEST);
@@ -37,13 +37,13 @@ impl Geometry {
         Self { height, width, pad, stride, part, columns: (0..kernel).map(column).collect() }
     }
 
-    /// Floats of scratch memory.
+    /// Returns the number of floats of scratch memory.
     pub(crate) fn scratch(&self) -> usize {
         (self.height.max(ROWS * self.stride) + 2 * self.pad) * self.part * self.stride + 2 * WIDEST
     }
 }
 
-/// What to convolve: offsets into memory and the filters.
+/// The planes of a convolution as offsets into memory, and the filters.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Planes<'a> {
     pub(crate) inputs: &'a [usize],
@@ -141,8 +141,8 @@ struct Filter<'a> {
     relu: bool,
 }
 
-/// Correlates scratch with the filter, [`ROWS`] output rows at a time, the last ones perhaps twice. Columns are walked from right
-/// to left, so that what the last vector of a row spills is overwritten by the next row's first.
+/// Correlates scratch memory with the filter, [`ROWS`] output rows at a time, the last ones perhaps twice. Columns are processed
+/// from right to left, so that the excess of the last vector of a row is overwritten by the first one of the next row.
 #[inline(always)]
 fn correlate<S: Simd, const K: usize, const STRIDE: usize, const SPAN: usize>(
     simd: S,

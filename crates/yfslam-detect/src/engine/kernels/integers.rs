@@ -1,4 +1,4 @@
-//! Matrix product in integers of 8 bits: the 1×1 convolutions of a model that names the ranges of what they read.
+//! Matrix product with 8-bit integers: the 1×1 convolutions of a model that has the scales of their inputs.
 //!
 //! An input x is stored as round(x / step) + zero, from 0 to 255; a weight as round(w / step of its row), from −127 to 127. Sums of
 //! products are exact, so every instruction set gives the same bits. Source: Jacob et al., Quantization and training of neural
@@ -10,26 +10,26 @@ use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 use super::matmul::{BLOCK, Rows};
 use super::{WIDEST, load};
 
-/// Inputs whose bytes share a word, as the instruction for dot products takes them.
+/// Inputs whose bytes share a word, as in the dot product instruction.
 const GROUP: usize = 4;
 
-/// How a tensor is stored in bytes: `value ≈ (byte − zero) · step`.
+/// Scale of a tensor in bytes: `value ≈ (byte − zero) · step`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scale {
     pub(crate) step: f32,
     pub(crate) zero: u8,
 }
 
-/// A weight matrix in the order in which the kernel reads it, padded with zeros to multiples of [`BLOCK`] and [`GROUP`].
+/// A weight matrix in the order of the kernel, padded with zeros to multiples of [`BLOCK`] and [`GROUP`].
 #[derive(Debug)]
 pub(crate) struct IntegerMatrix {
     input: Scale,
     groups: usize,
     /// `[row / BLOCK][column / GROUP][BLOCK]`, the weights of a group in one word, the first in its lowest byte.
     weights: Vec<[i32; BLOCK]>,
-    /// What a sum of no products is: it makes up for `zero`.
+    /// Start value of a sum, which compensates `zero`.
     start: Vec<[i32; BLOCK]>,
-    /// What a sum is to be multiplied by.
+    /// Factor of a sum.
     step: Vec<[f32; BLOCK]>,
     bias: Vec<[f32; BLOCK]>,
     relu: bool,
@@ -68,18 +68,18 @@ impl IntegerMatrix {
         }
     }
 
-    /// Rows including padding.
+    /// Returns the number of rows including padding.
     pub(crate) fn padded_rows(&self) -> usize {
         self.bias.len() * BLOCK
     }
 
-    /// Words of scratch memory for rows of `length` values.
+    /// Returns the number of words of scratch memory for rows of `length` values.
     pub(crate) fn scratch(&self, length: usize) -> usize {
         self.groups * length.next_multiple_of(WIDEST)
     }
 }
 
-/// `outputs = relu(weights · inputs + bias + addend)`, with inputs and weights rounded.
+/// Computes `outputs = relu(weights · inputs + bias + addend)` with rounded inputs and weights.
 pub(crate) fn multiply(level: Level, memory: &mut [f32], words: &mut [i32], matrix: &IntegerMatrix, rows: Rows) {
     dispatch!(level, simd => store(simd, memory, words, matrix, rows));
     #[cfg(target_arch = "x86_64")]
@@ -89,7 +89,7 @@ pub(crate) fn multiply(level: Level, memory: &mut [f32], words: &mut [i32], matr
     sum(memory, words, matrix, rows);
 }
 
-/// Rounds the inputs and puts them into `words`: for each group of inputs a row, for each position a word.
+/// Rounds the inputs and stores them in `words`: a row for each group of inputs, a word for each position.
 #[inline(always)]
 fn store<S: Simd>(simd: S, memory: &[f32], words: &mut [i32], matrix: &IntegerMatrix, rows: Rows) {
     simd.vectorize(
@@ -115,7 +115,7 @@ fn store<S: Simd>(simd: S, memory: &[f32], words: &mut [i32], matrix: &IntegerMa
     );
 }
 
-/// The products in plain Rust.
+/// Computes the products in plain Rust.
 fn sum(memory: &mut [f32], words: &[i32], matrix: &IntegerMatrix, rows: Rows) {
     let length = rows.length.next_multiple_of(WIDEST);
     for (index, output) in rows.outputs.iter().enumerate() {
@@ -140,7 +140,7 @@ fn sum(memory: &mut [f32], words: &[i32], matrix: &IntegerMatrix, rows: Rows) {
 
 #[cfg(target_arch = "x86_64")]
 fearless_simd::kernel!(
-    /// The products by AVX-512 with VNNI.
+    /// Computes the products with AVX-512 VNNI.
     fn sum_avx512(simd: Avx512, memory: &mut [f32], words: &[i32], matrix: &IntegerMatrix, rows: Rows<'_>) {
         let length = rows.length.next_multiple_of(WIDEST);
         let wide = length / (2 * WIDEST) * (2 * WIDEST);
@@ -153,7 +153,7 @@ fearless_simd::kernel!(
     }
 );
 
-/// All output channels for `V` vectors from `column` on.
+/// Computes all output channels for `V` vectors from `column` on.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vnni,avx512vl,avx512bw,avx512dq")]
 #[inline]
@@ -208,7 +208,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn equals_the_product_of_what_was_rounded(
+        fn equals_the_product_of_the_rounded_values(
             (count, depth, length) in (1..30_usize, 1..40_usize, 1..150_usize),
             (relu, adds) in any::<(bool, bool)>(),
             zero in any::<u8>(),
@@ -238,7 +238,7 @@ mod tests {
                         let added = if adds { f64::from(before[addend[row] + column]) } else { 0.0 };
                         let expected = (0..depth).map(product).sum::<f64>() + f64::from(bias[row]) + added;
                         let expected = if relu { expected.max(0.0) } else { expected };
-                        // An input half way between two bytes may become either.
+                        // An input halfway between two bytes may become either.
                         let slack = 1e-4 + depth as f64 * 1e-9;
                         prop_assert!((f64::from(*value) - expected).abs() < slack + f64::from(scale.step), "{level:?}: {value} instead of {expected}");
                     }

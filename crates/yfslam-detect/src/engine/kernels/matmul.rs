@@ -1,17 +1,17 @@
 //! Matrix product over planes: the 1×1 convolutions and the stem.
 //!
-//! In: a list of rows of floats (one per input channel or filter tap), packed weights. Out: one row per output channel.
-//! The inner loop keeps 6 output channels × 2 vectors in registers; rows are read where they lie, nothing is copied.
+//! In: a list of rows of floats (one per input channel or filter tap), packed weights. Out: one row per output channel. The inner
+//! loop keeps 6 output channels × 2 vectors in registers; rows are read in place and not copied.
 #![allow(clippy::needless_range_loop, reason = "iterator adapters are not inlined in every build, index loops are")]
 
 use fearless_simd::{Level, Simd, SimdBase, SimdFloat, dispatch};
 
 use super::{WIDEST, load};
 
-/// Output channels computed together.
+/// Output channels that are computed together.
 pub(crate) const BLOCK: usize = 6;
 
-/// A weight matrix in the order in which the kernel reads it, padded with zero rows to a multiple of [`BLOCK`].
+/// A weight matrix in the order of the kernel, padded with zero rows to a multiple of [`BLOCK`].
 #[derive(Debug)]
 pub(crate) struct Matrix {
     depth: usize,
@@ -39,13 +39,13 @@ impl Matrix {
         }
     }
 
-    /// Rows including padding.
+    /// Returns the number of rows including padding.
     pub(crate) fn padded_rows(&self) -> usize {
         self.bias.len() * BLOCK
     }
 }
 
-/// Where a product reads and writes, as offsets into the memory it is given.
+/// Offsets of a product into the memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rows<'a> {
     /// One per column of the matrix.
@@ -54,18 +54,18 @@ pub(crate) struct Rows<'a> {
     pub(crate) outputs: &'a [usize],
     /// Added to the product before ReLU, one per padded row, or empty.
     pub(crate) addend: &'a [usize],
-    /// Whether a result that is less than what its place holds is dropped.
+    /// Whether a result is dropped if it is smaller than the old value.
     pub(crate) keep_larger: bool,
     /// Floats per row; all are processed up to the next multiple of [`WIDEST`].
     pub(crate) length: usize,
 }
 
-/// `outputs = relu(weights · inputs + bias + addend)`, or the larger of that and what `outputs` held.
+/// Computes `outputs = relu(weights · inputs + bias + addend)`, or the maximum of that and the old `outputs`.
 pub(crate) fn multiply(level: Level, memory: &mut [f32], matrix: &Matrix, rows: Rows) {
     dispatch!(level, simd => multiply_simd(simd, memory, matrix, rows));
 }
 
-/// [`multiply`] from within a kernel.
+/// [`multiply`], called from within a kernel.
 #[inline(always)]
 pub(crate) fn multiply_simd<S: Simd>(simd: S, memory: &mut [f32], matrix: &Matrix, rows: Rows) {
     simd.vectorize(
@@ -83,7 +83,7 @@ pub(crate) fn multiply_simd<S: Simd>(simd: S, memory: &mut [f32], matrix: &Matri
     );
 }
 
-/// All output channels for `V` vectors from `column` on.
+/// Computes all output channels for `V` vectors from `column` on.
 #[inline(always)]
 fn blocks<S: Simd, const V: usize>(simd: S, memory: &mut [f32], matrix: &Matrix, rows: Rows, column: usize) {
     let floor = S::f32s::splat(simd, if matrix.relu { 0.0 } else { f32::NEG_INFINITY });
@@ -106,7 +106,7 @@ fn blocks<S: Simd, const V: usize>(simd: S, memory: &mut [f32], matrix: &Matrix,
     }
 }
 
-/// One block of output channels for `V` vectors.
+/// Computes one block of output channels for `V` vectors.
 #[inline(always)]
 fn product<S: Simd, const V: usize>(
     simd: S,

@@ -1,7 +1,7 @@
 //! The vector kernels, written once over `fearless_simd` and compiled for each instruction set.
 //!
-//! All work on one slice of floats, the network's memory, at offsets fixed when the model is loaded. What a kernel calls must be
-//! inlined into it, or it is compiled for the wrong instruction set.
+//! All kernels work on one slice of floats, the memory of the network, at offsets fixed when the model is loaded. Functions called
+//! by a kernel must be inlined into it, or they are compiled for the wrong instruction set.
 
 pub(crate) mod depthwise;
 pub(crate) mod integers;
@@ -11,16 +11,16 @@ pub(crate) mod upsample;
 
 use fearless_simd::{Level, Simd, SimdBase};
 
-/// The widest vector, floats. Whoever lays out memory leaves that much room for vectors that reach past the end of a row.
+/// The widest vector, floats. Every buffer has that much room for vectors that reach past the end of a row.
 pub(crate) const WIDEST: usize = 16;
 
-/// One vector from `memory` at `offset`.
+/// Loads one vector from `memory` at `offset`.
 #[inline(always)]
 fn load<S: Simd>(simd: S, memory: &[f32], offset: usize) -> S::f32s {
     S::f32s::from_slice(simd, &memory[offset..][..S::f32s::LEN])
 }
 
-/// The instruction sets that can be chosen on this machine, slowest first, the best one last.
+/// Returns the instruction sets of this machine, slowest first, the best one last.
 pub fn available_levels() -> Vec<Level> {
     let best = Level::new();
     let mut levels = vec![Level::baseline()];
@@ -39,22 +39,22 @@ pub fn available_levels() -> Vec<Level> {
 
 #[cfg(test)]
 mod testing {
-    //! Planes with random contents, placed as the network places them, to compare kernels with plain loops.
+    //! Planes with random contents, placed as the network places them, for comparing kernels with plain loops.
 
     use fearless_simd::Level;
 
     use super::WIDEST;
     use crate::engine::buffer_planner::stride;
 
-    /// What lies behind the planes and must stay.
+    /// Value after the planes, which must stay.
     const SENTINEL: f32 = 12345.0;
 
-    /// Every level, the scalar one included.
+    /// Returns every level, including the scalar one.
     pub(crate) fn levels() -> Vec<Level> {
         [vec![Level::fallback()], super::available_levels()].concat()
     }
 
-    /// Values in [−1, 1) that differ for each `seed`.
+    /// Returns values in [−1, 1) that differ for each `seed`.
     pub(crate) fn noise(count: usize, seed: u32) -> Vec<f32> {
         let mut state = seed.wrapping_mul(2_654_435_761) | 1;
         let mut next = || {
@@ -64,7 +64,7 @@ mod testing {
         (0..count).map(|_| next()).collect()
     }
 
-    /// Memory with groups of planes, each filled with noise to its last bit of room, and a sentinel behind.
+    /// Memory with groups of planes, filled with noise, and a sentinel after them.
     pub(crate) struct Arena {
         pub(crate) memory: Vec<f32>,
         planes: Vec<(usize, (usize, usize))>,
@@ -90,9 +90,9 @@ mod testing {
             &self.memory[offset..][..height * width]
         }
 
-        /// Fails if a plane other than `written` differs from `before`, or the sentinel does.
+        /// Fails if a plane other than `written` or the sentinel differs from `before`.
         pub(crate) fn assert_untouched(&self, before: &[f32], written: &[usize]) {
-            assert!(self.memory[self.end..].iter().all(|value| *value == SENTINEL), "written behind the last plane");
+            assert!(self.memory[self.end..].iter().all(|value| *value == SENTINEL), "written after the last plane");
             for (offset, (height, width)) in self.planes.iter().filter(|(offset, _)| !written.contains(offset)) {
                 let range = *offset..offset + height * width;
                 assert_eq!(self.memory[range.clone()], before[range], "the plane at {offset} was overwritten");

@@ -1,8 +1,8 @@
 //! The stem: convolution 3×3 stride 2, ReLU, max pool 3×3 stride 2, both with padding 1, row by row.
 //!
-//! Joined so that the large map in between (24 × 176 × 176) never exists: of its rows only the maximum of those with which a
-//! window begins, and the one with which it ends and the next begins. The convolution of one row is a matrix product over
-//! 3·3·channels rows of input, parted into even and odd columns.
+//! They are joined so that the large map in between (24 × 176 × 176) never exists: only two of its rows are kept, the maximum of
+//! the rows with which a window begins, and the one with which it ends and the next one begins. The convolution of one row is a
+//! matrix product over 3·3·channels rows of input, separated into even and odd columns.
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
@@ -19,14 +19,15 @@ pub(crate) struct Geometry {
     room: usize,
     /// Rows of the product for each of the three states of the input ring.
     products: [Vec<usize>; 3],
-    /// Where the product writes: two places for each filter, which take turns.
+    /// Offsets of the product: two places for each filter, which alternate.
     results: [Vec<usize>; 2],
     /// Floats of scratch memory.
     pub(crate) scratch: usize,
 }
 
 impl Geometry {
-    /// For `channels` input planes of `height × width` (both even) and `filters` rows of the matrix, padding included.
+    /// Computes the geometry for `channels` input planes of `height × width` (both even) and `filters` rows of the matrix, padding
+    /// included.
     pub(crate) fn new((height, width): (usize, usize), channels: usize, filters: usize) -> Self {
         let width = width / 2;
         let room = WIDEST + width.next_multiple_of(WIDEST) + WIDEST;
@@ -57,7 +58,7 @@ impl Geometry {
     }
 }
 
-/// Input ring: `[channel][row mod 3][even, odd columns]`, the values after [`WIDEST`] zeros.
+/// Returns an offset in the input ring: `[channel][row mod 3][even, odd columns]`, the values after [`WIDEST`] zeros.
 fn part_offset(room: usize, channel: usize, row: usize, odd: usize) -> usize {
     ((channel * 3 + row % 3) * 2 + odd) * room + WIDEST
 }
@@ -90,7 +91,7 @@ fn stem_simd<S: Simd>(
             for y in 0..geometry.height {
                 part_columns(simd, memory, scratch, geometry, inputs, 2 * y);
                 part_columns(simd, memory, scratch, geometry, inputs, 2 * y + 1);
-                // Windows are the rows 2k − 1, 2k, 2k + 1: an even row joins the odd one before it, an odd row starts afresh.
+                // Windows are the rows 2k − 1, 2k, 2k + 1: an even row joins the odd one before it, an odd row begins a new window.
                 let [begun, fresh] = [y / 2 % 2, 1 - y / 2 % 2].map(|turn| &geometry.results[turn][..]);
                 let rows = Rows {
                     inputs: &geometry.products[2 * y % 3],
@@ -111,7 +112,7 @@ fn stem_simd<S: Simd>(
     );
 }
 
-/// Copies row `y` of the input into its ring, even columns and odd columns apart.
+/// Copies row `y` of the input into its ring, with even and odd columns separated.
 #[inline(always)]
 fn part_columns<S: Simd>(
     simd: S,
@@ -135,8 +136,8 @@ fn part_columns<S: Simd>(
     }
 }
 
-/// Of two rows of `width`, the maximum over each window of three columns around an even one. Padding is 0, the least value after
-/// ReLU.
+/// Returns, for two rows of `width`, the maximum over each window of three columns around an even one. Padding is 0, the least
+/// value after ReLU.
 #[inline(always)]
 fn pool<S: Simd>(simd: S, scratch: &[f32], rows: [usize; 2], width: usize, pooled: &mut [f32]) {
     let length = (width / 2).next_multiple_of(S::f32s::LEN);
@@ -149,7 +150,7 @@ fn pool<S: Simd>(simd: S, scratch: &[f32], rows: [usize; 2], width: usize, poole
     }
 }
 
-/// The elementwise maximum of two slices of two vectors; even elements, odd elements.
+/// Returns the elementwise maximum of two slices of two vectors; even elements, odd elements.
 #[inline(always)]
 fn larger<S: Simd>(simd: S, (a, b): (&[f32], &[f32])) -> (S::f32s, S::f32s) {
     let low = load(simd, a, 0).max(load(simd, b, 0));

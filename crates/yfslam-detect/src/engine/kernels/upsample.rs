@@ -4,12 +4,12 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use super::load;
 
-/// Writes each input plane of `height × width` twice as large; offsets into memory.
+/// Writes each input plane of `height × width` twice as large; the arguments are offsets into memory.
 pub(crate) fn double(level: Level, memory: &mut [f32], size: (usize, usize), inputs: &[usize], outputs: &[usize]) {
     dispatch!(level, simd => double_simd(simd, memory, size, inputs, outputs));
 }
 
-/// Vectors may reach past the end of a row; rows are written in order, so the next one mends it.
+/// Vectors may write past the end of a row; rows are written in order, so that the next one overwrites this.
 #[inline(always)]
 fn double_simd<S: Simd>(
     simd: S,

@@ -1,4 +1,4 @@
-//! The part of an ONNX file that matters here: bytes in, nodes, weights, inputs, outputs and metadata out.
+//! Reads the needed part of an ONNX file: nodes, weights, inputs, outputs and metadata.
 //!
 //! Field numbers are those of `onnx.proto` (<https://github.com/onnx/onnx/blob/main/onnx/onnx.proto>).
 
@@ -10,7 +10,7 @@ use wire::{Fields, Value, WireError};
 
 type Read<T> = Result<T, WireError>;
 
-/// A model with its graph; everything borrows from the file's bytes where it can.
+/// A model with its graph; it borrows from the bytes of the file where possible.
 #[derive(Debug, Default)]
 pub(crate) struct Model<'a> {
     pub(crate) nodes: Vec<Node<'a>>,
@@ -31,7 +31,7 @@ pub(crate) struct Node<'a> {
     pub(crate) attributes: BTreeMap<&'a str, Attribute<'a>>,
 }
 
-/// An attribute; only the member that its type names is filled.
+/// An attribute; only the member for its type is filled.
 #[derive(Debug, Default)]
 pub(crate) struct Attribute<'a> {
     pub(crate) float: Option<f32>,
@@ -54,7 +54,7 @@ pub(crate) struct Tensor {
 pub(crate) enum TensorData {
     Floats(Vec<f32>),
     Ints(Vec<i64>),
-    /// A type that is not read; the number is ONNX's `TensorProto.DataType`.
+    /// A type that is not supported; the number is ONNX's `TensorProto.DataType`.
     Other(i64),
     /// Stored in another file.
     External,
@@ -207,7 +207,7 @@ pub(crate) const FLOAT: i64 = 1;
 const INT64: i64 = 7;
 const FLOAT16: i64 = 10;
 
-/// The value of a float of 16 bits (IEEE 754 binary16), which 32 bits hold exactly.
+/// Converts a 16-bit float (IEEE 754 binary16) to 32 bits, which is exact.
 fn half(bits: u16) -> f32 {
     let sign = u32::from(bits & 0x8000) << 16;
     let (exponent, fraction) = (u32::from(bits >> 10 & 0x1f), u32::from(bits & 0x3ff));
@@ -248,7 +248,7 @@ impl<'a> ValueInfo<'a> {
     }
 }
 
-/// The sub-messages with field number `number`.
+/// Returns the sub-messages with field number `number`.
 fn children(message: &[u8], number: u64) -> impl Iterator<Item = &[u8]> {
     Fields::new(message).filter_map(move |field| match field {
         Ok((found, Value::Bytes(bytes))) if found == number => Some(bytes),
@@ -276,11 +276,11 @@ mod tests {
         for (bits, value) in cases {
             assert_eq!(half(bits), value, "{bits:#x}");
         }
-        // The least there is, the largest below the normal ones, both zeros.
+        // The smallest value, the largest below the normal ones, both zeros.
         assert_eq!([half(0x0001), half(0x83ff)], [2.0_f32.powi(-24), -1023.0 * 2.0_f32.powi(-24)]);
         assert_eq!([half(0), half(0x8000)].map(f32::to_bits), [0, 1 << 31]);
         assert!(half(0x7c00) == f32::INFINITY && half(0xfc00) == f32::NEG_INFINITY && half(0x7e00).is_nan());
-        // Positive ones ascend with their bits.
+        // Positive values ascend with their bits.
         assert!((0..0x7c00).map(half).is_sorted());
     }
 }

@@ -1,6 +1,6 @@
-//! The protobuf wire format: bytes in, (field number, value) pairs out.
+//! The protobuf wire format: converts bytes to (field number, value) pairs.
 //!
-//! Source: <https://protobuf.dev/programming-guides/encoding/>. Reading only, borrowed, no schema.
+//! Source: <https://protobuf.dev/programming-guides/encoding/>. Reading only, borrowed, without a schema.
 
 /// What is wrong with the bytes.
 #[derive(Debug)]
