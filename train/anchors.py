@@ -1,4 +1,5 @@
-"""Boxes of altered training pictures in, six anchors out: k-means with 1 - IoU of the sides as distance (YOLOv2: Redmon, 2017).
+"""Computes six anchors from the boxes of augmented training images: k-means with 1 - IoU of the sides as distance (YOLOv2: Redmon,
+2017).
 
     python -m train.anchors CACHE...
 """

@@ -1,8 +1,8 @@
-"""Pictures and boxes in, one altered training picture out; every draw comes from the generator that is passed in.
+"""Augments training images and their boxes; every random draw comes from the generator that is passed in.
 
-Geometry is one affine warp per picture (stretch, turn, mirror, zoom, shift), so nothing is interpolated twice. A turned box is
-bounded by its inscribed ellipse, not by its corners: people fill the ellipse, and corners would make boxes up to 40 % too large.
-A mosaic (Bochkovskiy et al., 2020) fills four parts of the canvas with four pictures.
+Geometry is one affine warp per image (stretch, rotation, mirror, zoom, shift), so that nothing is interpolated twice. A rotated box
+is bounded by its inscribed ellipse and not by its corners: people fill the ellipse, and corners would make boxes up to 40 % too
+large. A mosaic (Bochkovskiy et al., 2020) fills four parts of the canvas with four images.
 """
 
 import cv2
@@ -10,16 +10,16 @@ import numpy as np
 
 from . import clutter
 
-VISIBLE = 0.1  # of a cut person's box must remain for it to count; below, its place teaches nothing
+VISIBLE = 0.1  # share of a box that must remain for it to count; otherwise its region is ignored
 LEAST_SIDE = 9.0  # px
-CLOSE = 0.5  # of the pictures with people that are no mosaic show one of them close, mostly cut by the left or the right edge
-CLUTTER = 0.8  # of the pictures without people are strewn with drawn things, and half as many of those with people
-DESK = 0.3  # of the pictures without people have a drawn desk in the foreground
-EMPTY = 0.5  # of the pictures lose everybody: a part is taken that shows nobody
+CLOSE = 0.5  # share of the images with people, except mosaics, with a close person, mostly cut by the left or the right edge
+CLUTTER = 0.8  # share of the images without people that get drawn objects, and half this share of those with people
+DESK = 0.3  # share of the images without people with a drawn desk in the foreground
+EMPTY = 0.5  # share of the images that are reduced to a part without people
 
 
 def angle(rng):
-    """Camera roll, degrees: mostly upright, often up to 45, at times up to 100."""
+    """Draws the camera roll, degrees: mostly upright, often up to 45, sometimes up to 100."""
     kind = rng.random()
     if kind < 0.55:
         return rng.normal(0, 5)
@@ -27,25 +27,26 @@ def angle(rng):
 
 
 def matrix(rng, boxes, source, width, height, zoom, theta, cut=False):
-    """The affine map from a `source` px square picture onto a width x height canvas; `cut`: its left or right edge goes through somebody."""
+    """Returns the affine map from a square image of `source` px onto a width x height canvas; with `cut` its left or right edge
+    cuts a person."""
     scale = zoom * np.sqrt(width * height) / source
     before, after = np.exp(rng.uniform(-0.25, 0.35)), np.exp(rng.uniform(-0.4, 0.2))
     cos, sin = np.cos(np.radians(theta)), np.sin(np.radians(theta))
     flip = 1.0 if rng.random() < 0.5 else -1.0
     turn = np.array([[cos, -sin], [sin, cos]])
     linear = scale * np.diag([after**0.5, after**-0.5]) @ turn @ np.diag([flip * before**0.5, before**-0.5])
-    # a point of the picture, mostly one of a person, goes to a random point of the canvas: people cut by every edge
+    # a point of the image, mostly on a person, goes to a random point of the canvas, so that people are cut by every edge
     anchor = rng.uniform(0, source, 2)
     if len(boxes) and (cut or rng.random() < 0.7):
         x0, y0, x1, y1 = boxes[rng.integers(len(boxes)), 1:5] * source
-        margin = 0.12 if cut else 0.0  # less than an eighth of a person may show nothing of him
+        margin = 0.12 if cut else 0.0  # less than an eighth of a box may contain no visible part of the person
         anchor = np.array([x0, y0]) + rng.uniform(margin, 1 - margin, 2) * (x1 - x0, y1 - y0)
     size = np.array([width, height], float)
     goal = rng.uniform(0, 1, 2) * size
-    if cut:  # by the edge that lies on the same side in the picture, or the picture would have to end within the canvas
+    if cut:  # by the edge on the same side of the image; otherwise the image would have to end within the canvas
         goal[0] = 0 if (linear @ (anchor - source / 2))[0] < 0 else width
     shift = goal - linear @ anchor
-    # no needless border: a picture larger than the canvas covers it, a smaller one lies within
+    # no unnecessary border: an image larger than the canvas covers it, a smaller one lies within
     corners = linear @ (np.array([[0, 1, 0, 1], [0, 0, 1, 1]]) * source)
     low, high = corners.min(1), corners.max(1)
     bounds = np.sort(np.stack([-low, size - high]), axis=0)
@@ -54,7 +55,8 @@ def matrix(rng, boxes, source, width, height, zoom, theta, cut=False):
 
 
 def place(boxes, affine, source, region):
-    """Boxes on the canvas, cut at `region` (x0, y0, x1, y1), and the places to ignore: what is left of people nearly outside."""
+    """Returns the boxes on the canvas, clipped at `region` (x0, y0, x1, y1), and the regions to ignore: the remains of people
+    nearly outside."""
     if not len(boxes):
         return boxes.reshape(0, 5), np.zeros((0, 4))
     centre = (boxes[:, 1:3] + boxes[:, 3:5]) / 2 * source @ affine[:, :2].T + affine[:, 2]
@@ -71,7 +73,7 @@ def place(boxes, affine, source, region):
 
 
 def colour(rng, image):
-    """Exposure, contrast, white balance, saturation and hue as one linear map, then a gamma curve."""
+    """Changes exposure, contrast, white balance, saturation and hue with one linear map, then applies a gamma curve."""
     grey = np.full((3, 3), 1.0) * np.array([0.114, 0.587, 0.299])
     saturation = 0.0 if rng.random() < 0.06 else np.exp(rng.uniform(-0.7, 0.4))
     mix = saturation * np.eye(3) + (1 - saturation) * grey
@@ -88,7 +90,7 @@ def colour(rng, image):
 
 
 def spoil(rng, image):
-    """What a cheap moving camera adds: blur of motion and focus, coarse pixels, noise, JPEG."""
+    """Adds the errors of a cheap moving camera: motion and focus blur, coarse pixels, noise, JPEG."""
     kind = rng.random()
     if kind < 0.12:
         length, direction = int(rng.integers(3, 10)), rng.uniform(0, np.pi)
@@ -111,7 +113,7 @@ def spoil(rng, image):
 
 
 def erase(rng, image):
-    """A plain patch hides part of the scene, as furniture does (Zhong et al., 2020)."""
+    """Hides part of the scene behind a plain patch, as furniture does (Zhong et al., 2020)."""
     height, width = image.shape[:2]
     w, h = rng.uniform(0.08, 0.35, 2) * (width, height)
     x, y = rng.uniform(0, width - w), rng.uniform(0, height - h)
@@ -119,8 +121,8 @@ def erase(rng, image):
 
 
 def without_people(rng, image, boxes):
-    """A square part of a square picture that shows nobody, or else the picture with everybody behind something: what else stands about
-    must be learnt too."""
+    """Returns a square part of a square image without people, or else the image with all people hidden, so that the network learns
+    the other objects too."""
     for _ in range(12):
         share = rng.uniform(0.25, 0.8)
         low = rng.uniform(0, 1 - share, 2)
@@ -132,9 +134,9 @@ def without_people(rng, image, boxes):
 
 
 def sample(rng, draw, side, mosaic=0.35, strength=1.0):
-    """A picture of side x side px, its boxes [n, 5] (class, corners, px) and places to ignore [m, 4].
+    """Returns an image of side x side px, its boxes [n, 5] (class, corners, px) and regions to ignore [m, 4].
 
-    `draw(rng)` gives a picture and its relative boxes. `strength` 0 leaves the picture whole, 1 alters it fully.
+    `draw(rng)` returns an image and its relative boxes. `strength` 0 leaves the image unchanged, 1 augments it fully.
     """
     border = [(114, 114, 114), (0, 0, 0), tuple(int(v) for v in rng.integers(0, 256, 3))][rng.choice(3, p=[0.5, 0.3, 0.2])]
     canvas = np.empty((side, side, 3), np.uint8)

@@ -1,13 +1,13 @@
-"""Folders of pictures in, one array of equal squares out, so that training decodes nothing.
+"""Converts folders of images to one array of equal squares, so that training decodes nothing.
 
     python -m train.cache yolo  PHOTOS  CACHE --classes person      # PHOTOS/images/*, PHOTOS/labels/*.txt: class cx cy w h, relative
-    python -m train.cache synth FOLDER  CACHE --classes person chair  # recordings that `yfslam synth` wrote, at any depth below
+    python -m train.cache synth FOLDER  CACHE --classes person chair  # recordings of `yfslam synth`, at any depth below
 
-CACHE/images.npy: uint8 [N, 352, 352, 3], blue green red, stretched. CACHE/labels.npz: boxes [M, 5] (class, x0, y0, x1, y1; relative),
-first box of each picture [N + 1], group [N], held_out [N], and the class names.
+CACHE/images.npy: uint8 [N, 352, 352, 3], blue green red, stretched. CACHE/labels.npz: boxes [M, 5] (class, x0, y0, x1, y1;
+relative), first box of each image [N + 1], group [N], held_out [N], and the class names.
 
-Pictures that show one scene (frames of one film, copies of one photo with other colours or turned) form a group; a group is
-held out as a whole, by a hash of the bytes of its pictures. Otherwise the held-out part would measure memory.
+Images of one scene (frames of one film, copies of one photo with other colours or rotated) form a group. A group is held out as a
+whole, by a hash of the bytes of its images; otherwise the held-out part would measure memorisation.
 """
 
 import argparse
@@ -19,12 +19,12 @@ import cv2
 import numpy as np
 
 SIDE = 352
-LEAST_SEEN = 0.12  # share of its box that must show the thing
+LEAST_SEEN = 0.12  # share of its box in which the object must be visible
 SAME_SCENE = 0.85  # correlation of 16 x 16 grey thumbnails, in the best of eight orientations
 
 
 def yolo_folder(folder, classes):
-    """Yields (path, boxes) of a folder in YOLO's text form."""
+    """Yields (path, boxes) of a folder in YOLO's text format."""
     for path in sorted((folder / "images").iterdir()):
         text = (folder / "labels" / (path.stem + ".txt")).read_text() if (folder / "labels" / (path.stem + ".txt")).exists() else ""
         rows = np.array([line.split()[:5] for line in text.splitlines() if line.strip()], np.float32).reshape(-1, 5)
@@ -33,7 +33,7 @@ def yolo_folder(folder, classes):
 
 
 def synthetic_folders(folder, classes):
-    """Yields (path, boxes) of every recording of `yfslam synth` below `folder`. Things of which others leave little to see are left out."""
+    """Yields (path, boxes) of every recording of `yfslam synth` below `folder`, without objects that are mostly hidden."""
     for about in sorted(folder.glob("**/boxes.json")):
         stamps = {round(frame["timestamp_ns"] / 1e3): frame["boxes"] for frame in json.loads(about.read_text())["frames"]}
         for line in (about.parent / "rgb.txt").read_text().splitlines():
@@ -53,7 +53,7 @@ def synthetic_folders(folder, classes):
 
 
 def groups(thumbnails):
-    """The number of each picture's scene: connected components of 'looks alike'."""
+    """Returns the scene number of each image: connected components of similar images."""
     count = len(thumbnails)
     flat = thumbnails.reshape(count, -1)
     turned = [t[:, :, ::-1] if mirrored else t for t in (np.rot90(thumbnails, k, (1, 2)) for k in range(4)) for mirrored in (False, True)]
@@ -74,11 +74,11 @@ def groups(thumbnails):
 
 
 def hold_out(group, hashes, share):
-    """Which pictures are held out: those of the groups whose least hash is below `share` of all hashes."""
+    """Selects the held-out images: those of the groups whose least hash is below `share` of all hashes."""
     least = {}
     for g, h in zip(group, hashes):
         least[g] = min(least.get(g, "g"), h)
-    # the least of many hashes is small: hash once more for an even draw
+    # the least of many hashes is small: hash again for a uniform draw
     draw = {g: int(hashlib.sha256(h.encode()).hexdigest()[:12], 16) / 16**12 for g, h in least.items()}
     return np.array([draw[g] < share for g in group])
 
@@ -89,7 +89,7 @@ def write(pictures, classes, out, share):
         data = path.read_bytes()
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
         if image is None:
-            raise SystemExit(f"{path}: cannot be read as a picture")
+            raise SystemExit(f"{path}: cannot be read as an image; remove it or convert it")
         if image.shape[:2] != (SIDE, SIDE):
             shrinks = image.shape[0] >= SIDE and image.shape[1] >= SIDE
             image = cv2.resize(image, (SIDE, SIDE), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
@@ -104,7 +104,7 @@ def write(pictures, classes, out, share):
     out.mkdir(parents=True, exist_ok=True)
     np.save(out / "images.npy", np.array(images))
     np.savez(out / "labels.npz", boxes=np.concatenate(boxes), first=np.array(first), group=group, held_out=held_out, classes=np.array(classes))
-    print(f"{len(images)} pictures in {len(set(group))} scenes, {held_out.sum()} held out, {first[-1]} boxes -> {out}")
+    print(f"{len(images)} images in {len(set(group))} scenes, {held_out.sum()} held out, {first[-1]} boxes -> {out}")
 
 
 def main():
@@ -113,7 +113,7 @@ def main():
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("cache", type=pathlib.Path)
     parser.add_argument("--classes", nargs="+", default=["person"], help="names of the class numbers in the label files; of synthetic folders: the classes to keep")
-    parser.add_argument("--hold-out", type=float, default=0.15, help="share of the scenes that is never trained on")
+    parser.add_argument("--hold-out", type=float, default=0.15, help="share of the scenes that is not used for training")
     options = parser.parse_args()
     read = {"yolo": yolo_folder, "synth": synthetic_folders}[options.form]
     write(read(options.folder, options.classes), options.classes, options.cache, options.hold_out)

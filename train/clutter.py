@@ -1,7 +1,8 @@
-"""Things that are nobody, drawn over pictures: dark and light slabs, sheets with lines, jars of pens, blobs, and desks with screens.
+"""Draws objects other than people into images: dark and light slabs, sheets with lines, jars of pens, blobs, and desks with
+screens.
 
-Photos of people hold few desks, screens and shelves; a network that has seen little of them takes what stands upright and is
-coloured, or large and dark, for somebody. The shapes are simple on purpose: none of them looks like a person.
+Photos of people contain few desks, screens and shelves; a network trained on them alone detects upright coloured objects and large
+dark ones as people. The shapes are simple on purpose: none of them resembles a person.
 """
 
 import cv2
@@ -9,14 +10,14 @@ import numpy as np
 
 
 def paint(rng):
-    """Half of all things are grey or nearly so."""
+    """Returns a random colour; half of all objects are grey or nearly grey."""
     value = rng.choice([rng.uniform(0, 60), rng.uniform(0, 255), rng.uniform(190, 255)])
     spread = rng.choice([6.0, 90.0])
     return tuple(np.clip(value + rng.uniform(-spread, spread, 3), 0, 255).tolist())
 
 
 def slab(rng, image, centre, size):
-    """A turned rectangle, at times in perspective, with a rim: screens, boxes, books, shelves."""
+    """Draws a rotated rectangle, sometimes in perspective, with a rim: screens, boxes, books, shelves."""
     turn = np.radians(rng.normal(0, 12))
     axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (1 + rng.normal(0, 0.08, (4, 2)))
@@ -28,7 +29,7 @@ def slab(rng, image, centre, size):
 
 
 def sheet(rng, image, centre, size):
-    """A slab with lines: pages, keyboards, racks."""
+    """Draws a slab with lines: pages, keyboards, racks."""
     a, b, c, d = slab(rng, image, centre, size).astype(float)
     colour, rows = paint(rng), int(rng.integers(2, 14))
     for row in (np.arange(rows) + 0.5) / rows:
@@ -39,7 +40,7 @@ def sheet(rng, image, centre, size):
 
 
 def jar(rng, image, centre, size):
-    """A bundle of coloured sticks in a vessel: pens, tools, bottles, cables."""
+    """Draws a bundle of coloured sticks in a vessel: pens, tools, bottles, cables."""
     foot = centre + (0, 0.1 * size[1])
     for _ in range(rng.integers(2, 12)):
         tip = centre + rng.uniform(-0.5, 0.5, 2) * size * (1, 0.3) - (0, 0.4 * size[1])
@@ -50,7 +51,7 @@ def jar(rng, image, centre, size):
 
 
 def blob(rng, image, centre, size):
-    """An ellipse, shaded by a second one: cups, lamps, fruit, wheels, bags."""
+    """Draws an ellipse, shaded by a second one: cups, lamps, fruit, wheels, bags."""
     angle = float(rng.uniform(0, 180))
     for share in (1.0, rng.uniform(0.4, 0.9)):
         axes = np.maximum(size * share / 2, 1).astype(int).tolist()
@@ -58,7 +59,7 @@ def blob(rng, image, centre, size):
 
 
 def screen(rng, image, centre, size):
-    """A dark or shining slab in a rim on a foot, at times with windows on it."""
+    """Draws a dark or bright slab in a rim on a foot, sometimes with windows on it."""
     foot = centre + (0, 0.62 * size[1])
     blob(rng, image, foot, size * (rng.uniform(0.2, 0.5), 0.25))
     edge = size * rng.uniform(1.02, 1.15)
@@ -70,7 +71,8 @@ def screen(rng, image, centre, size):
 
 
 def desk(rng, image):
-    """A copy of a picture of nobody with a desk before it that fills much of it: what a robot sees of an office from near."""
+    """Returns a copy of an image without people with a desk in the foreground that fills much of it, as in the view of a robot in
+    an office."""
     image, side = np.ascontiguousarray(image).copy(), image.shape[0]
     top = rng.uniform(-0.2, 0.7) * side
     slab(rng, image, np.array([0.5 * side, 0.5 * (top + 1.3 * side)]), np.array([1.8 * side, 1.3 * side - top]))
@@ -85,13 +87,13 @@ def desk(rng, image):
 
 
 def hides(centre, size, boxes):
-    """Whether a thing would cover more than a fifth of anybody; boxes [n, 4] in px."""
+    """Returns whether an object would cover more than a fifth of any person; boxes [n, 4] in px."""
     low, high = np.maximum(centre - 0.6 * size, boxes[:, :2]), np.minimum(centre + 0.6 * size, boxes[:, 2:])
     return (np.maximum(high - low, 0).prod(1) > 0.2 * (boxes[:, 2:] - boxes[:, :2]).prod(1)).any()
 
 
 def cover(rng, image, boxes):
-    """A copy of the square picture with everybody in `boxes` (relative) behind something."""
+    """Returns a copy of the square image with all people in `boxes` (relative) hidden."""
     image = np.ascontiguousarray(image).copy()
     for low, high in boxes[:, 1:5].reshape(-1, 2, 2) * image.shape[0]:
         (slab, sheet)[rng.integers(2)](rng, image, (low + high) / 2, (high - low) * rng.uniform(1.4, 1.8, 2))
@@ -99,8 +101,8 @@ def cover(rng, image, boxes):
 
 
 def strew(rng, image, boxes):
-    """A copy of the square picture with up to 16 things on it, the larger ones first, beside the people in `boxes` (relative). Pictures
-    of people need them too, or drawn things would tell that nobody is there."""
+    """Returns a copy of the square image with up to 16 objects, the larger ones first, beside the people in `boxes` (relative).
+    Images with people need them too, or drawn objects would indicate that there are no people."""
     image = np.ascontiguousarray(image).copy()
     count = int(rng.integers(2, 17))
     sides = np.sort(np.exp(rng.uniform(np.log(0.06), np.log(0.8), count)))[::-1] * image.shape[0]

@@ -1,4 +1,4 @@
-"""All settings of a training in one place; they are stored in every checkpoint."""
+"""All settings of a training; they are stored in every checkpoint."""
 
 import dataclasses
 
@@ -16,7 +16,7 @@ class Config:
     weight_decay: float = 0.05
     warm_up: int = 400  # steps
     average: float = 0.9995  # of the moving average of the weights, per step
-    # [from this sample on, sides of training pictures, px]: small ones first, they teach more per second (progressive resizing)
+    # [from this sample on, sides of training images, px]: small ones first, because they are faster (progressive resizing)
     sides: list = dataclasses.field(default_factory=lambda: [[0, [160, 192, 224]], [160000, [192, 224, 256, 288]]])
-    mosaic: float = 0.35  # share of pictures that are put together from four
-    strength: float = 1.0  # of the turning, 0 to 1
+    mosaic: float = 0.35  # share of images that are composed of four
+    strength: float = 1.0  # of the augmentation, 0 to 1

@@ -1,5 +1,6 @@
-"""Caches in, batches out. Sample number n of a training is a function of (seed, n) alone, so that a resumed training sees what an
-uninterrupted one would have seen."""
+"""Reads caches and returns batches. Sample number n of a training depends on (seed, n) alone, so that a resumed training gets the
+same samples as an uninterrupted one.
+"""
 
 import pathlib
 
@@ -9,12 +10,12 @@ import torch
 
 from . import augment
 
-MOST_BOXES = 24  # per picture
+MOST_BOXES = 24  # per image
 
 
 class Cache:
-    """One cached source; `classes` is the network's list, boxes of other classes are dropped. `labelled`: 1 for each class of the network
-    that the cache has labels of."""
+    """One cached source; `classes` is the list of the network, and boxes of other classes are dropped. `labelled`: 1 for each class
+    of the network for which the cache has labels."""
 
     def __init__(self, folder, classes, held_out=False):
         folder = pathlib.Path(folder)
@@ -30,7 +31,7 @@ class Cache:
             rows = labels["boxes"][first[index]:first[index + 1]].astype(np.float64)
             rows[:, 0] = number[rows[:, 0].astype(int)]
             self.boxes.append(rows[rows[:, 0] >= 0])
-        # a scene seen 30 times counts like 5 or 6 scenes, not like 30
+        # a scene with 30 images counts like 5 or 6 scenes, not like 30
         group = labels["group"][self.chosen]
         size = np.bincount(group)[group]
         self.weight = size**-0.5
@@ -44,7 +45,7 @@ class Cache:
 
 
 class Samples(torch.utils.data.Dataset):
-    """Item (n, side, mosaic, strength) is the training picture n. `shares` says how often each cache is drawn from."""
+    """Item (n, side, mosaic, strength) is training image n. `shares` are the probabilities of the caches."""
 
     def __init__(self, caches, shares, seed):
         self.caches, self.shares, self.seed = caches, np.cumsum(np.array(shares) / np.sum(shares)), seed
@@ -52,7 +53,7 @@ class Samples(torch.utils.data.Dataset):
     def __getitem__(self, item):
         number, side, mosaic, strength = item
         rng = np.random.default_rng([self.seed, number])
-        # all parts of a mosaic come from one cache, so that one list of labelled classes holds for the picture
+        # all parts of a mosaic come from one cache, so that one list of labelled classes is valid for the image
         cache = self.caches[min(int(np.searchsorted(self.shares, rng.random())), len(self.caches) - 1)]
         image, boxes, ignored = augment.sample(rng, cache.draw, side, mosaic, strength)
         targets = np.full((MOST_BOXES, 5), -1, np.float32)
@@ -70,6 +71,6 @@ def start_worker(_):
 
 
 def loader(samples, batches, workers):
-    """`batches` yields lists of items."""
+    """Returns a loader; `batches` yields lists of items."""
     return torch.utils.data.DataLoader(samples, batch_sampler=batches, num_workers=workers, worker_init_fn=start_worker,
                                        prefetch_factor=4 if workers else None)

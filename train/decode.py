@@ -1,4 +1,4 @@
-"""Six raw maps of one picture in, boxes out: the same formulas, suppression and fusion as the Rust runtime, in NumPy."""
+"""Decodes the six raw maps of one image into boxes: the same formulas, suppression and fusion as in the Rust engine, in NumPy."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ def sigmoid(x):
 
 
 def blob(image, side=SIDE):
-    """Picture (uint8, blue green red) to network input [1, 3, side, side]: plain stretch, values in [0, 1]."""
+    """Converts an image (uint8, blue green red) to the network input [1, 3, side, side]: plain stretch, values in [0, 1]."""
     import cv2
     if image.shape[:2] != (side, side):
         image = cv2.resize(image.astype(np.float32), (side, side), interpolation=cv2.INTER_LINEAR)
@@ -25,7 +25,7 @@ def iou(box, boxes):
 
 
 def decode(outputs, anchors, wanted, least=0.3, suppress=0.5, fuse=0.7):
-    """Boxes [n, 4] (corners, relative) of class number `wanted` and their scores, best first.
+    """Returns the boxes [n, 4] (corners, relative) of class number `wanted` and their scores, best first.
 
     outputs: reg, obj, cls at the fine, then at the coarse grid, each [1, channels, rows, columns]; anchors in px of the input.
     """

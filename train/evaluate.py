@@ -1,12 +1,12 @@
-"""Measures detectors side by side, with one evaluator.
+"""Evaluates several detectors with the same program.
 
     python -m train.evaluate CACHE MODEL... [--data DATA] [--empty FOLDER] [--json FILE]
 
 MODEL: a checkpoint (.pt) or an ONNX file with six raw maps (anchors from its metadata, else those of COCO; `person` must be one of
-its classes). On the held-out pictures of CACHE: AP50 of people, recall and precision at score 0.3, upright and turned by 30, 60 and
-90 degrees to either side. With the folder of development data: how often everyone in sight is covered on
-labels/bonn_crowd_dev_100.json, and how many people are wrongly reported on tum_fr1_xyz_dev. With a folder of recordings in which
-there is nobody (FOLDER/*/rgb): how many are reported there.
+its classes). On the held-out images of CACHE: AP50 of people, recall and precision at score 0.3, upright and rotated by 30, 60 and
+90 degrees to either side. With the folder of development data: how often all visible people are covered on
+labels/bonn_crowd_dev_100.json, and the number of false detections on tum_fr1_xyz_dev. With a folder of recordings without people
+(FOLDER/*/rgb): the number of detections there.
 """
 
 import argparse
@@ -21,12 +21,12 @@ from .decode import blob, decode, iou
 from .metrics import summary
 
 COCO_ANCHORS = [12.64, 19.39, 37.88, 51.48, 55.71, 138.31, 126.91, 78.23, 131.57, 214.55, 279.92, 258.87]
-MAN_IN_SIGHT = [(0, 8), (52, 103), (143, 232), (283, 299)]  # frames of tum_fr1_xyz_dev
+MAN_VISIBLE = [(0, 8), (52, 103), (143, 232), (283, 299)]  # frames of tum_fr1_xyz_dev
 LABELS = pathlib.Path(__file__).parent / "labels"
 
 
 class Network:
-    """A picture in, boxes of people (corners, relative) and scores out."""
+    """Takes an image and returns boxes of people (corners, relative) and scores."""
 
     def __init__(self, path):
         if path.suffix == ".pt":
@@ -56,8 +56,8 @@ class Network:
 
 
 def turned(image, boxes, degrees):
-    """The picture turned about its middle, grey where nothing is known; boxes bound the turned inscribed ellipses and are cut at the
-    edge. People of whom less than half is left are not counted."""
+    """Returns the image rotated about its centre, grey outside; boxes bound the rotated inscribed ellipses and are clipped at the
+    edge. People with less than half remaining are not counted."""
     side = image.shape[0]
     affine = cv2.getRotationMatrix2D((side / 2 - 0.5, side / 2 - 0.5), degrees, 1.0)
     picture = cv2.warpAffine(image, affine, (side, side), flags=cv2.INTER_LINEAR, borderValue=(114, 114, 114))
@@ -71,7 +71,7 @@ def turned(image, boxes, degrees):
 
 
 def held_out(network, cache, degrees=(), score=0.3):
-    """Metrics over the held-out pictures, each turned by all of `degrees`."""
+    """Returns the metrics over the held-out images, each rotated by all of `degrees`."""
     found, truths = [], []
     for index in cache.chosen:
         image, boxes = np.array(cache.images[index]), cache.boxes[index][:, 1:]
@@ -83,7 +83,8 @@ def held_out(network, cache, degrees=(), score=0.3):
 
 
 def crowd(network, data, score=0.3):
-    """Share of labelled frames with people in which each is covered: by one box at IoU 0.5; or all but 30 % of the person by one box."""
+    """Returns the share of labelled frames with people in which each person is covered: by one box at IoU 0.5; or at least 70 % of
+    the person by one box."""
     labels = json.loads((LABELS / "bonn_crowd_dev_100.json").read_text())
     size = np.array([labels["width"], labels["height"]] * 2)
     good = loose = frames = people = hits = empty = false = 0
@@ -106,20 +107,20 @@ def crowd(network, data, score=0.3):
 
 
 def false_alarms(network, data, score=0.3):
-    """People reported per frame of a desk. A man sits behind it: in some frames a box with its centre in the upper left may be him and is
-    not counted as false."""
+    """Returns the number of detections per frame of a desk. A man sits behind it: in some frames a box with its centre in the upper
+    left may be that man and is not counted as false."""
     files = sorted((data / "rgbd/tum_fr1_xyz_dev/rgb").iterdir())
     total = false = 0
     for number, file in enumerate(files):
         boxes, scores = network(cv2.imread(str(file)))
         x, y = (boxes[scores > score].reshape(-1, 2, 2).mean(1)).T
-        him = any(first <= number <= last for first, last in MAN_IN_SIGHT) & (x < 0.62) & (y < 0.36)
+        him = any(first <= number <= last for first, last in MAN_VISIBLE) & (x < 0.62) & (y < 0.36)
         total, false = total + len(x), false + int((~him).sum())
     return {"frames": len(files), "reported_per_frame": total / len(files), "false_per_frame": false / len(files)}
 
 
-def nobody(network, folder, score=0.3):
-    """People reported per frame of recordings without any, and in the worst of the recordings."""
+def empty_recordings(network, folder, score=0.3):
+    """Returns the number of detections per frame of recordings without people, and that in the worst of the recordings."""
     per_frame = []
     for recording in sorted(path for path in folder.iterdir() if (path / "rgb").is_dir()):
         files = sorted((recording / "rgb").iterdir())
@@ -137,7 +138,7 @@ def report(network, cache, data, empty):
         rows["bonn_crowd_dev"] = crowd(network, data)
         rows["tum_fr1_xyz_dev"] = false_alarms(network, data)
     if empty:
-        rows["nobody"] = nobody(network, empty)
+        rows["without people"] = empty_recordings(network, empty)
     return rows
 
 

@@ -1,8 +1,9 @@
-"""Checkpoint in, ONNX file out: six raw maps, batch norm folded, anchors and class names in the metadata, as the runtime reads it.
+"""Exports a checkpoint to ONNX: six raw maps, batch norm folded, anchors and class names in the metadata, in the form for the Rust
+engine.
 
     python -m train.export RUN/final.pt person.onnx           # float32
     python -m train.export RUN/final.pt person.onnx --half    # weights stored as float16: half the size
-    python -m train.export RUN/final.pt person.onnx --as-0.3 0.45   # what scored 0.45 scores 0.3, the SLAM's threshold
+    python -m train.export RUN/final.pt person.onnx --as-0.3 0.45   # a score of 0.45 becomes 0.3, the threshold of the SLAM system
 """
 
 import argparse
@@ -24,7 +25,7 @@ NAMES = ["reg_22", "obj_22", "cls_22", "reg_11", "obj_11", "cls_11"]
 
 
 def load(path):
-    """The averaged network of a checkpoint, ready to evaluate, and its settings."""
+    """Returns the averaged network of a checkpoint, ready to evaluate, and its settings."""
     state = torch.load(path, weights_only=False, map_location="cpu")
     config = Config(**state["config"])
     model = YoloFastestV2(len(config.classes), config.widths)
@@ -33,7 +34,7 @@ def load(path):
 
 
 def fold(module):
-    """Joins every convolution with the batch norm behind it."""
+    """Joins every convolution with the batch norm after it."""
     for child in module.children():
         fold(child)
     if isinstance(module, nn.Sequential):
@@ -60,7 +61,7 @@ def halve(graph):
 
 
 def shift(model, score):
-    """Shifts objectness so that `score` becomes 0.3: the order of detections, and AP with it, stays."""
+    """Shifts the objectness so that `score` becomes 0.3; the order of detections, and with it AP, stays the same."""
     logit = lambda p: np.log(p / (1 - p))
     with torch.no_grad():
         model.obj.bias += float(logit(0.3) - logit(score))
@@ -86,7 +87,7 @@ def main():
     parser.add_argument("checkpoint", type=pathlib.Path)
     parser.add_argument("onnx", type=pathlib.Path)
     parser.add_argument("--half", action="store_true", help="store the weights as float16")
-    parser.add_argument("--as-0.3", dest="score", type=float, default=0.3, help="the score that is to become 0.3 (0.3)")
+    parser.add_argument("--as-0.3", dest="score", type=float, default=0.3, help="the score that becomes 0.3 (default 0.3)")
     options = parser.parse_args()
     write(options.checkpoint, options.onnx, options.half, options.score)
 

@@ -1,10 +1,10 @@
-"""Trains the detector; stops and resumes at will.
+"""Trains the detector; it can be stopped and resumed at any time.
 
-    python -m train.fit RUN CACHE...                          # starts, or goes on from RUN/last.pt
+    python -m train.fit RUN CACHE...                          # starts, or continues from RUN/last.pt
     python -m train.fit RUN CACHE... --decay 60000 --side 352   # from RUN/last.pt: rate to 0 over 60000 samples -> RUN/final.pt
 
-The rate is constant after a warm-up (so that nobody needs to know in advance how long training will last) and falls to zero only
-in a branch that ends in usable weights. RUN/last.pt holds everything that resuming needs; RUN/log.csv grows by a row per evaluation.
+The rate is constant after a warm-up, so that the duration of the training need not be known in advance, and falls to zero only in a
+branch that ends in usable weights. RUN/last.pt has everything for resuming; each evaluation adds a row to RUN/log.csv.
 """
 
 import argparse
@@ -31,7 +31,7 @@ PARTS = ["box", "object", "class", "iou", "pairs"]
 
 
 class Batches:
-    """From sample `start` on, lists of items for the loader; each of several processes takes its share of every batch."""
+    """Lists of items for the loader from sample `start` on; each of several processes takes its share of every batch."""
 
     def __init__(self, config, start, stop, sides, rank, world):
         self.config, self.start, self.stop, self.sides, self.rank, self.world = config, start, stop, sides, rank, world
@@ -47,14 +47,14 @@ class Batches:
 
 
 def parameter_groups(model, decay):
-    """Weight decay for the filters only."""
+    """Returns the parameters with weight decay for the filters only."""
     filters = [p for p in model.parameters() if p.ndim > 1]
     others = [p for p in model.parameters() if p.ndim <= 1]
     return [{"params": filters, "weight_decay": decay}, {"params": others, "weight_decay": 0.0}]
 
 
 def rate(config, step, seen, decay):
-    """Factor of the rate: linear warm-up, then 1, then linearly to 0 within `decay` = (first sample, last sample)."""
+    """Returns the factor of the rate: linear warm-up, then 1, then linearly to 0 within `decay` = (first sample, last sample)."""
     factor = min(1.0, (step + 1) / config.warm_up)
     if decay:
         factor *= max(0.0, (decay[1] - seen) / (decay[1] - decay[0]))
@@ -80,7 +80,7 @@ def share_gradients(model, world):
 
 @torch.no_grad()
 def evaluate(model, cache, config, side, wanted=0):
-    """Metrics of class `wanted` on the pictures of `cache`, at `side` px."""
+    """Returns the metrics of class `wanted` on the images of `cache`, at `side` px."""
     model.eval()
     found, truths = [], []
     for index in cache.chosen:
@@ -101,7 +101,7 @@ def save(path, **state):
 
 
 def adopt(model, weights):
-    """Loads weights; a class map of other size keeps the classes that both have."""
+    """Loads weights; a class map of another size keeps the classes that both have."""
     own = model.state_dict()
     for name in ("cls.weight", "cls.bias"):
         if weights[name].shape != own[name].shape:
@@ -133,7 +133,7 @@ def train(rank, world, options):
         same = state["optimizer"] and len(state["model"]["cls.bias"]) == len(config.classes)
         adopt(model, state["model"])
         adopt(mean, state["mean"])
-        if same:  # else there are no moments that fit, and they start anew
+        if same:  # otherwise no moments fit, and they start again
             optimizer.load_state_dict(state["optimizer"])
         step, seen = state["step"], state["seen"]
     decay = (seen, seen + options.decay) if options.decay else None
@@ -174,7 +174,7 @@ def train(rank, world, options):
         if rank == 0 and (seen >= next_evaluation or seen >= stop):
             next_evaluation += options.every
             speed = count * config.batch / (time.time() - told)
-            side = int(np.median(batches.sides_at(seen)) / 32) * 32  # a network trained on small pictures is at home there
+            side = int(np.median(batches.sides_at(seen)) / 32) * 32  # a network trained on small images is best there
             small, scores = evaluate(mean, held_out, config, side), evaluate(mean, held_out, config, SIDE)
             row = {"time": time.strftime("%H:%M:%S"), "branch": out.stem, "samples": seen, "rate": f"{config.rate * factor:.5f}",
                    **{name: f"{value:.4f}" for name, value in zip(PARTS, (sums / count).tolist())},
@@ -194,14 +194,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=pathlib.Path)
     parser.add_argument("caches", type=pathlib.Path, nargs="+", help="from train.cache; the first one's held-out part is evaluated")
-    parser.add_argument("--shares", type=float, nargs="+", help="how often each cache is drawn from")
-    parser.add_argument("--samples", type=int, default=10**9, help="stop after this many more")
+    parser.add_argument("--shares", type=float, nargs="+", help="share of samples that each cache gets")
+    parser.add_argument("--samples", type=int, default=10**9, help="stop after this number of further samples")
     parser.add_argument("--decay", type=int, default=0, help="samples over which the rate falls to 0")
-    parser.add_argument("--side", type=int, nargs="+", help="sides of the training pictures, instead of the setting's")
+    parser.add_argument("--side", type=int, nargs="+", help="sides of the training images, instead of those of the settings")
     parser.add_argument("--start", type=pathlib.Path, help="checkpoint to start from, instead of RUN/last.pt")
     parser.add_argument("--name", help="file to write, instead of `last` or `final`")
     parser.add_argument("--every", type=int, default=16000, help="samples between evaluations")
-    parser.add_argument("--processes", type=int, default=1, help="each on one core, gradients are averaged")
+    parser.add_argument("--processes", type=int, default=1, help="number of processes, each on one core; gradients are averaged")
     parser.add_argument("--set", nargs="+", default=[], metavar="NAME=VALUE", help="settings of train/config.py")
     options = parser.parse_args()
     options.run.mkdir(parents=True, exist_ok=True)

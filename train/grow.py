@@ -1,11 +1,11 @@
-"""Starts a training from a network that there is: with its own number of channels, or more of them.
+"""Starts a training from an existing network, with the same number of channels or more.
 
-    python -m train.grow crates/yfslam-detect/models/person.onnx RUN/last.pt RUNS/persons                        # for own classes
-    python -m train.grow person.onnx RUN/last.pt RUNS/persons --widths 24 48 128 256 96                          # to learn more
+    python -m train.grow crates/yfslam-detect/models/person.onnx RUN/last.pt RUNS/persons                        # for other classes
+    python -m train.grow person.onnx RUN/last.pt RUNS/persons --widths 24 48 128 256 96                          # for a larger network
 
-SOURCE is a checkpoint or a file that train.export wrote. The new network computes the same maps (Net2Net: Chen et al., ICLR 2016): channels
-that are new start at random, and what reads old channels does not yet read them. The batch norms, which an exported file has lost,
-are set to what pictures of CACHE give, so that training goes on smoothly.
+SOURCE is a checkpoint or a file of train.export. The new network computes the same maps (Net2Net: Chen et al., ICLR 2016): new
+channels start at random, and the readers of old channels do not read them yet. The batch norms, which an exported file does not
+have, are set to the statistics of images of CACHE, so that training continues smoothly.
 """
 
 import argparse
@@ -26,14 +26,14 @@ from .model import UNITS, YoloFastestV2
 
 
 def read(path):
-    """Weights of the folded network, by name, and its settings."""
+    """Returns the weights of the folded network, by name, and its settings."""
     if path.suffix == ".pt":
         model, config = load(path)
         return fold(model).state_dict(), config
     model = onnx.load(path)
     about = {entry.key: json.loads(entry.value) for entry in model.metadata_props if entry.key in ("names", "anchors")}
     if not {"names", "anchors"} <= about.keys():
-        raise SystemExit(f"{path} was not written by train.export: it does not tell its classes and anchors")
+        raise SystemExit(f"{path} was not written by train.export: it does not contain its classes and anchors; export it with train.export")
     arrays = {t.name.removesuffix("_half"): onnx.numpy_helper.to_array(t).astype(np.float32) for t in model.graph.initializer}
     weights = {name: torch.from_numpy(array.copy()) for name, array in arrays.items()}
     outputs = lambda name: len(weights[name + ".weight"])
@@ -42,13 +42,14 @@ def read(path):
 
 
 def halves(old, new):
-    """New places of a stage's channels. A unit passes channel 2 k to place k and transforms the odd ones, so places keep: place(2 k) =
-    2 place(k), odd ones stay odd, the upper half stays the upper half; then a channel is the same in every unit."""
+    """Returns the new places of the channels of a stage. A unit passes channel 2 k to place k and transforms the odd ones. The
+    places keep place(2 k) = 2 place(k), odd ones stay odd, and the upper half stays the upper half; then a channel is the same
+    in every unit."""
     place, taken = np.zeros(old, int), {0}
     for k in range(1, old):
         if k % 2 == 0:
             place[k] = 2 * place[k // 2]
-        else:  # as long as it is below the half, doubling must not carry it over the half too early or too late
+        else:  # doubling must not move the place over the half too early or too late
             doublings = 0
             while k << doublings < old // 2:
                 doublings += 1
@@ -61,7 +62,7 @@ def halves(old, new):
 
 
 def places(old, new):
-    """For each convolution of the network, where its old outputs and inputs are in the new one."""
+    """Returns, for each convolution of the network, the places of its old outputs and inputs in the new one."""
     maps = {}
     same = lambda count: np.arange(count)
     before, before_new = same(old[0]), new[0]
@@ -87,7 +88,7 @@ def places(old, new):
 
 @torch.no_grad()
 def fill(model, weights, maps):
-    """Puts folded `weights` into `model`; batch norms pass what they are given, plus the bias."""
+    """Copies folded `weights` into `model`; batch norms pass their input, plus the bias."""
     modules = dict(model.named_modules())
     for name, (rows, columns) in maps.items():
         layer = modules[name]
@@ -110,7 +111,7 @@ def fill(model, weights, maps):
 
 @torch.no_grad()
 def settle(model, batches):
-    """Sets the batch norms' statistics to those of the pictures, without a change of what the network computes."""
+    """Sets the statistics of the batch norms to those of the images, without changing the function of the network."""
     sums = {}
 
     def watch(norm):
@@ -137,10 +138,10 @@ def settle(model, batches):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("source", type=pathlib.Path)
-    parser.add_argument("out", type=pathlib.Path, help="the checkpoint that train.fit goes on from")
+    parser.add_argument("out", type=pathlib.Path, help="the checkpoint from which train.fit continues")
     parser.add_argument("cache", type=pathlib.Path)
-    parser.add_argument("--widths", type=int, nargs=5, help="channels of the stem, of three stages, of the pyramid (as they are)")
-    parser.add_argument("--seen", type=int, default=0, help="samples that the source has learnt from; later ones are new to it")
+    parser.add_argument("--widths", type=int, nargs=5, help="channels of the stem, of the three stages, of the pyramid (default: unchanged)")
+    parser.add_argument("--seen", type=int, default=0, help="number of samples with which the source was trained; the training continues with later ones")
     options = parser.parse_args()
     weights, config = read(options.source)
     old, config["widths"] = config["widths"], options.widths or config["widths"]

@@ -1,9 +1,9 @@
-"""Six raw maps and boxes in, the training loss out.
+"""Computes the training loss from six raw maps and boxes.
 
-Each box chooses its anchors by what the network makes of them (simOTA: Ge et al., YOLOX, 2021): candidates are the anchors, on
-both grids, of the four cells from which the decoding can reach its centre, if the sides differ by less than a factor of 4; the
-box takes its k cheapest, k = sum of the IoU of its candidates. Boxes learn from CIoU (Zheng et al., AAAI 2020), objectness from
-binary cross-entropy, classes from cross-entropy.
+Each box chooses its anchors by the predictions of the network (simOTA: Ge et al., YOLOX, 2021): candidates are the anchors, on both
+grids, of the four cells from which the decoding can reach its centre, if the sides differ by less than a factor of 4; the box takes
+its k cheapest, k = sum of the IoU of its candidates. Boxes learn from CIoU (Zheng et al., AAAI 2020), objectness from binary
+cross-entropy, classes from cross-entropy.
 """
 
 import math
@@ -18,8 +18,8 @@ BOX_WEIGHT, LOCATION_COST = 5.0, 3.0
 
 
 def flatten(outputs, anchors):
-    """Logits and decoded boxes of all anchors. anchors: [2, 3, 2], px. Returns boxes [B, A, 4] (corners, px), objectness [B, A],
-    classes [B, A, C]; A counts grid, anchor, row, column."""
+    """Returns logits and decoded boxes of all anchors. anchors: [2, 3, 2], px. Returns boxes [B, A, 4] (corners, px), objectness
+    [B, A], classes [B, A, C]; A counts grid, anchor, row, column."""
     boxes, objects, classes = [], [], []
     for grid, stride in enumerate(STRIDES):
         reg, obj, cls = (map.float() for map in outputs[3 * grid:3 * grid + 3])
@@ -38,7 +38,7 @@ def flatten(outputs, anchors):
 
 
 def iou(a, b):
-    """Intersection over union of corner boxes [..., 4], by pairs."""
+    """Returns the intersection over union of corner boxes [..., 4], by pairs."""
     low, high = torch.maximum(a[..., :2], b[..., :2]), torch.minimum(a[..., 2:], b[..., 2:])
     shared = (high - low).clamp(min=0).prod(-1)
     area = lambda r: (r[..., 2:] - r[..., :2]).clamp(min=0).prod(-1)
@@ -46,7 +46,7 @@ def iou(a, b):
 
 
 def ciou(a, b):
-    """IoU less the penalties for the distance of the centres and for unlike proportions; and the IoU."""
+    """Returns the IoU less the penalties for the distance of the centres and for different proportions; and the IoU."""
     overlap = iou(a, b)
     hull = torch.maximum(a[..., 2:], b[..., 2:]) - torch.minimum(a[..., :2], b[..., :2])
     distance = ((a[..., :2] + a[..., 2:] - b[..., :2] - b[..., 2:]) / 2).square().sum(-1) / (hull.square().sum(-1) + 1e-6)
@@ -58,7 +58,7 @@ def ciou(a, b):
 
 
 def candidates(targets, anchors, side):
-    """For each box [B, T], the numbers of its candidate anchors [B, T, 24] and which of them are allowed."""
+    """Returns, for each box [B, T], the numbers of its candidate anchors [B, T, 24] and which of them are allowed."""
     centre, size = (targets[..., 1:3] + targets[..., 3:5]) / 2, targets[..., 3:5] - targets[..., 1:3]
     numbers, allowed, start = [], [], 0
     for grid, stride in enumerate(STRIDES):
@@ -81,7 +81,7 @@ def candidates(targets, anchors, side):
 
 @torch.no_grad()
 def assign(boxes, objects, classes, targets, anchors, side):
-    """Pairs (picture, anchor, box) that belong together, as three index vectors."""
+    """Returns assigned pairs (image, anchor, box) as three index vectors."""
     real = targets[..., 0] >= 0
     numbers, allowed = candidates(targets, anchors, side)
     allowed &= real.unsqueeze(-1)
@@ -100,7 +100,7 @@ def assign(boxes, objects, classes, targets, anchors, side):
     taken = (rank < wish.unsqueeze(-1)) & allowed
     picture, box, which = taken.nonzero(as_tuple=True)
     anchor, price = numbers[picture, box, which], cost[picture, box, which]
-    # an anchor that two boxes want goes to the one it suits better
+    # an anchor that two boxes choose is assigned to the one with the lower cost
     key = picture * boxes.shape[1] + anchor
     least = torch.full((batch * boxes.shape[1],), math.inf).scatter_reduce(0, key, price, "amin")
     keep = price == least[key]
@@ -108,9 +108,10 @@ def assign(boxes, objects, classes, targets, anchors, side):
 
 
 def object_terms(objects, classes, truth, labelled):
-    """Binary cross-entropy of each anchor [B, A]. Where a picture has no labels of some class, an anchor that is empty according to the
-    labels may hold a thing of that class: only its probability of holding a labelled one, objectness times the share of the labelled
-    classes [B, C], is pushed to zero; -log(1 - s p) = softplus(o) - softplus(o + log(1 - p)) with s the sigmoid of o."""
+    """Returns the binary cross-entropy of each anchor [B, A]. Where an image has no labels of some class, an anchor that is empty
+    according to the labels may contain an object of that class: only its probability of a labelled object, objectness times the
+    share of the labelled classes [B, C], is pushed to zero; -log(1 - s p) = softplus(o) - softplus(o + log(1 - p)) with s the
+    sigmoid of o."""
     terms = F.binary_cross_entropy_with_logits(objects, truth, reduction="none")
     if labelled.all():
         return terms
@@ -120,8 +121,9 @@ def object_terms(objects, classes, truth, labelled):
 
 
 def detection_loss(outputs, targets, ignored, labelled, anchors, side):
-    """Loss and its parts (boxes, objectness, classes, mean IoU, pairs per picture). targets [B, T, 5], class -1: none; `ignored`
-    [B, side / 16, side / 16]: 1 where nothing is to be learnt; labelled [B, C]: 1 for the classes that the picture has labels of."""
+    """Returns the loss and its parts (boxes, objectness, classes, mean IoU, pairs per image). targets [B, T, 5], class -1: none;
+    `ignored` [B, side / 16, side / 16]: 1 where nothing is learnt; labelled [B, C]: 1 for the classes for which the image has
+    labels."""
     boxes, objects, classes = flatten(outputs, anchors)
     picture, anchor, box = assign(boxes, objects, classes, targets, anchors, side)
     pairs = max(len(picture), 1)

@@ -1,4 +1,4 @@
-"""Found boxes and true boxes in, average precision and recall out."""
+"""Computes average precision and recall from detected and true boxes."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from .decode import iou
 
 
 def match(boxes, truth, least=0.5):
-    """For each found box (best first) the true box it is given to, or -1. Each true box is given away once."""
+    """Returns, for each detected box (best first), the true box it is assigned to, or -1. Each true box is assigned once."""
     free = np.ones(len(truth), bool)
     given = np.full(len(boxes), -1)
     for index, box in enumerate(boxes):
@@ -19,9 +19,9 @@ def match(boxes, truth, least=0.5):
 
 
 def summary(found, truths, score=0.3, tall=0.3):
-    """found: (boxes, scores) of each picture, with scores from near 0 on; truths: true boxes of each picture; all relative.
+    """found: (boxes, scores) of each image, with scores from near 0 on; truths: true boxes of each image; all relative.
 
-    AP50: area under precision over recall at IoU 0.5, precision made monotone. The rest at scores above `score`.
+    AP50: area under precision over recall at IoU 0.5, with monotone precision. The other metrics are at scores above `score`.
     """
     scores, right, hits, talls, tall_hits, reported, correct = [], [], 0, 0, 0, 0, 0
     for (boxes, values), truth in zip(found, truths):

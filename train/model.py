@@ -1,8 +1,8 @@
-"""The network: image batch in, six maps of raw logits out. ShuffleNetV2 backbone (Ma et al., ECCV 2018), a light feature pyramid
-(Lin et al., CVPR 2017), and two heads per grid, the layout that the runtime's fused plan expects.
+"""The network: takes a batch of images and returns six maps of raw logits. ShuffleNetV2 backbone (Ma et al., ECCV 2018), a light
+feature pyramid (Lin et al., CVPR 2017), and two heads per grid, the layout for the fused plan of the Rust engine.
 
-Input [N, 3, H, W]: blue, green, red in [0, 1], H and W multiples of 32. Output, for stride 16 and then 32:
-reg [N, 12, h, w], obj [N, 3, h, w], cls [N, C, h, w]. The last 1x1 convolutions are shared between the two grids.
+Input [N, 3, H, W]: blue, green, red in [0, 1], H and W multiples of 32. Output, for stride 16 and then 32: reg [N, 12, h, w], obj
+[N, 3, h, w], cls [N, C, h, w]. The last 1x1 convolutions are shared between the two grids.
 """
 
 import math
@@ -12,7 +12,7 @@ from torch import nn
 
 STRIDES = (16, 32)
 ANCHORS_PER_GRID = 3
-UNITS = (4, 8, 4)  # of the three stages
+UNITS = (4, 8, 4)  # number of units of the three stages
 
 
 def conv(inputs, outputs, kernel=1, stride=1, groups=1, relu=True):
@@ -29,12 +29,12 @@ class Unit(nn.Module):
         self.main = nn.Sequential(*conv(half, half), *conv(half, half, 3, groups=half, relu=False), *conv(half, half))
 
     def forward(self, x):
-        odd = x[:, 1::2].contiguous(memory_format=torch.channels_last)  # a fifth of the time of training
+        odd = x[:, 1::2].contiguous(memory_format=torch.channels_last)  # saves a fifth of the training time
         return torch.cat([x[:, 0::2], self.main(odd)], 1)
 
 
 class Down(nn.Module):
-    """A ShuffleNetV2 unit with stride 2: both branches see all channels."""
+    """A ShuffleNetV2 unit with stride 2: both branches read all channels."""
 
     def __init__(self, inputs, outputs):
         super().__init__()
@@ -55,8 +55,8 @@ class Head(nn.Sequential):
 
 
 class YoloFastestV2(nn.Module):
-    """See the module's text. `widths`: channels of the stem, of the three stages and of the pyramid; `prior`: the objectness that every
-    cell starts with."""
+    """The network of this module. `widths`: channels of the stem, of the three stages and of the pyramid; `prior`: initial
+    objectness of every cell."""
 
     def __init__(self, classes=1, widths=(24, 48, 96, 192, 72), prior=0.01):
         super().__init__()

@@ -1,13 +1,15 @@
-"""What 8-bit integers would cost an exported network: rounds weights and activations as integer arithmetic would, and evaluates.
+"""Measures the cost of 8-bit integers for an exported network: rounds weights and activations like integer arithmetic, and
+evaluates.
 
     python -m train.quantize RUNS/persons person.onnx --out person.onnx
 
-With --out, the file is written again with the scales of what 1x1 convolutions read (least square error) in its metadata: the runtime can
-then compute these in integers (`--integers`).
+With --out, the file is written again with the scales of the inputs of 1x1 convolutions (least square error) in its metadata: the
+engine can then compute these with integers (`--integers`).
 
-Weights: symmetric, a scale for each output channel. What enters a convolution: unsigned, a scale and an offset for each tensor, from
-pictures that were trained on (Krishnamoorthi, Quantizing deep convolutional networks for efficient inference, arXiv 1806.08342). Sums are kept
-exact, as those of 32-bit integers are, and tensors that no convolution reads are not rounded: an implementation can be as good, not better.
+Weights: symmetric, a scale for each output channel. Inputs of convolutions: unsigned, a scale and an offset for each tensor, from
+training images (Krishnamoorthi, Quantizing deep convolutional networks for efficient inference, arXiv 1806.08342). Sums are kept
+exact, like those of 32-bit integers, and tensors that no convolution reads are not rounded: this is the best that an implementation
+can reach.
 """
 
 import argparse
@@ -39,7 +41,7 @@ VARIANTS = {  # name: (range of activations, kinds of convolution left in float)
 
 
 def plain(model):
-    """The network with float32 weights, whatever they are stored as."""
+    """Returns the network with float32 weights, however they are stored."""
     stored = {tensor.name: tensor for tensor in model.graph.initializer}
     for node in [node for node in model.graph.node if node.op_type == "Cast" and node.input[0] in stored]:
         values = numpy_helper.to_array(stored[node.input[0]]).astype(np.float32)
@@ -49,7 +51,7 @@ def plain(model):
 
 
 def kind(node, graph, weights):
-    """What the convolution is: first, last, depthwise or 1x1."""
+    """Returns the kind of a convolution: first, last, depthwise or 1x1."""
     shape = weights[node.input[1]].shape
     if node.input[0] == graph.input[0].name:
         return "first"
@@ -59,7 +61,7 @@ def kind(node, graph, weights):
 
 
 def work(model):
-    """Share of the multiply-adds by kind of convolution."""
+    """Returns the share of the multiply-adds by kind of convolution."""
     graph = onnx.shape_inference.infer_shapes(model).graph
     weights = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
     shapes = {v.name: v.type.tensor_type.shape.dim for v in [*graph.value_info, *graph.output]}
@@ -71,7 +73,7 @@ def work(model):
 
 
 def collect(model, names, pictures):
-    """For each tensor its least and greatest value over the pictures, and the histogram between them."""
+    """Returns, for each tensor, its least and greatest value over the images, and the histogram between them."""
     model = copy.deepcopy(model)
     known = {output.name for output in model.graph.output}
     model.graph.output.extend(onnx.ValueInfoProto(name=name) for name in names if name not in known)
@@ -88,7 +90,8 @@ def collect(model, names, pictures):
 
 
 def interval(how, low, high, counts):
-    """The values that are told apart; what lies beside becomes the nearest. 0 is always one of them, margins are."""
+    """Returns the range of the quantised values; values outside become the nearest one. 0 is always one of them, because margins
+    are 0."""
     middles = low + (np.arange(BINS) + 0.5) * (high - low) / BINS
     if how == "percentile":
         share, tail = counts.cumsum() / counts.sum(), 1 - PERCENTILE / 100
@@ -111,7 +114,7 @@ def rounded(values, step, zero):
 
 
 def quantized(model, ranges, how, left):
-    """The network with rounded weights, and rounding before each convolution that is not of a kind in `left`."""
+    """Returns the network with rounded weights, and with rounding before each convolution of a kind that is not in `left`."""
     model = copy.deepcopy(model)
     graph = model.graph
     stored = {tensor.name: tensor for tensor in graph.initializer}
@@ -136,7 +139,7 @@ def quantized(model, ranges, how, left):
 
 
 def describe(model, ranges):
-    """The scales in the metadata, on each line the name of a convolution, the step and the zero of what it reads."""
+    """Returns the scales for the metadata: on each line the name of a convolution, and the step and the zero of its input."""
     weights = {tensor.name: numpy_helper.to_array(tensor) for tensor in plain(copy.deepcopy(model)).graph.initializer}
     lines = []
     for node in model.graph.node:
@@ -153,8 +156,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cache", type=pathlib.Path)
     parser.add_argument("model", type=pathlib.Path)
-    parser.add_argument("--pictures", type=int, default=300, help="from which the ranges of activations are taken")
-    parser.add_argument("--out", type=pathlib.Path, help="write the model with the scales of what its 1x1 convolutions read")
+    parser.add_argument("--pictures", type=int, default=300, help="number of images from which the ranges of activations are computed")
+    parser.add_argument("--out", type=pathlib.Path, help="write the model with the scales of the inputs of its 1x1 convolutions")
     parser.add_argument("--quick", action="store_true", help="do not evaluate")
     options = parser.parse_args()
     learnt, cache = Cache(options.cache, ["person"]), Cache(options.cache, ["person"], held_out=True)

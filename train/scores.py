@@ -1,10 +1,11 @@
-"""What a network would find and report if another score than 0.3 became 0.3: for the choice of `train.export --as-0.3`.
+"""Shows recall and false alarms of a network if another score than 0.3 became 0.3, for the choice of `train.export --as-0.3`.
 
     python -m train.scores CACHE MODEL --data DATA [--empty FOLDER] [--scores 0.3 0.35 0.4 ...]
 
-A row per score: tall people found on the held-out pictures of CACHE and precision there, frames of labels/bonn_crowd_dev_100.json in
-which everybody is covered, boxes per frame of it without people, false alarms per frame of tum_fr1_xyz_dev and of recordings without
-people (FOLDER/*/rgb). Boxes are fused by their scores: the exported network's figures can differ by a hair.
+One row per score: recall of tall people on the held-out images of CACHE and precision there, share of frames of
+labels/bonn_crowd_dev_100.json in which all people are covered, boxes per frame of it without people, false alarms per frame of
+tum_fr1_xyz_dev and of recordings without people (FOLDER/*/rgb). Boxes are fused by their scores, so that the figures of the
+exported network can differ slightly.
 """
 
 import argparse
@@ -13,11 +14,11 @@ import pathlib
 import numpy as np
 
 from .data import Cache
-from .evaluate import Network, crowd, false_alarms, held_out, nobody
+from .evaluate import Network, crowd, false_alarms, held_out, empty_recordings
 
 
 class Remembering:
-    """A network that looks at each picture once."""
+    """A network that processes each image once."""
 
     def __init__(self, network):
         self.network, self.found = network, {}
@@ -39,13 +40,13 @@ def main():
     options = parser.parse_args()
     cache = Cache(options.cache, ["person"], held_out=True)
     network = Remembering(Network(options.model))
-    print("score  tall  precision  everybody  empty frame  desk" + ("  nobody" if options.empty else ""))
+    print("score  tall  precision  all found  empty frame  desk" + ("  no people" if options.empty else ""))
     for score in options.scores:
         photos, bonn = held_out(network, cache, score=score), crowd(network, options.data, score)
         desk = false_alarms(network, options.data, score)["false_per_frame"]
         row = f"{score:5.3f}  {photos['tall_recall']:.3f}      {photos['precision']:.3f}      {bonn['all_at_iou_.5']:.3f}        {bonn['false_per_empty_frame']:.3f} {desk:.3f}"
         if options.empty:
-            row += f"   {nobody(network, options.empty, score)['false_per_frame']:.3f}"
+            row += f"   {empty_recordings(network, options.empty, score)['false_per_frame']:.3f}"
         print(row, flush=True)
 
 

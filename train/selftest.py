@@ -140,7 +140,7 @@ def a_grown_network_computes_what_the_exported_one_computes():
                 assert max(float((a - b).detach().abs().max()) for a, b in zip(wanted, grown(image))) < 1e-3, widths
 
 
-def somebody_is_cut_by_an_upright_edge():
+def a_person_is_cut_by_an_upright_edge():
     boxes = np.array([[0, 0.6, 0.2, 0.8, 0.9]])
     for seed in range(50):
         affine = augment.matrix(np.random.default_rng(seed), boxes, 100, 80, 80, 2.5, 0.0, cut=True)

@@ -1,9 +1,9 @@
-"""The mean of the weights of several trainings that began from the same network (Wortsman et al., Model soups, ICML 2022).
+"""Computes the mean of the weights of several trainings that began from the same network (Wortsman et al., Model soups, ICML 2022).
 
     python -m train.soup OUT.pt A.pt B.pt...
 
-It takes the time of one of them. The embedded network is such a mean: with as many people found it has fewer false alarms than each half
-(`train.scores`). OUT can be exported, evaluated, and trained on.
+It runs as fast as one of them. The embedded network is such a mean: at the same recall it has fewer false alarms than each of the
+two (`train.scores`). OUT can be exported, evaluated, and trained further.
 """
 
 import argparse
@@ -26,7 +26,7 @@ def main():
                 parser.error(f"{path} has other {key} than {options.checkpoints[0]}; only networks of one shape have a mean")
     last = max(states, key=lambda state: state["seen"])
     mean = {name: torch.stack([state["mean"][name].float() for state in states]).mean(0).to(value.dtype) for name, value in last["mean"].items()}
-    # The moments of none fit.
+    # No moments fit the mean.
     save(options.out, **{**last, "model": mean, "mean": mean, "optimizer": None})
     print(f"{options.out}: the mean of {len(states)}")
 

@@ -1,8 +1,8 @@
-"""How well people are found when the camera is rolled: in pictures as they are, and set upright as the tracker has it done.
+"""Measures the detection of people by a rolled camera: in the images as they are, and with roll compensation as in the tracker.
 
     python -m train.upright CACHE --program target/release/yfslam [--detector MODEL] [--integers]
 
-On the held-out pictures of CACHE, turned by 30, 60 and 90 degrees to either side; `yfslam detect --roll` is what is measured.
+On the held-out images of CACHE, rotated by 30, 60 and 90 degrees to either side; it measures `yfslam detect --roll`.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from .metrics import summary
 
 
 def found(program, own, folder, roll):
-    """Boxes (corners, relative) and scores in each picture of the folder, in the order of their names."""
+    """Returns boxes (corners, relative) and scores of each image of the folder, in the order of their names."""
     command = [program, "detect", folder, "--roll", str(roll), "--score", "0.01", "--out", folder / "out", "--quiet", *own]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     for image in json.loads((folder / "out/boxes.json").read_text())["images"]:
@@ -34,8 +34,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cache", type=pathlib.Path)
     parser.add_argument("--program", type=pathlib.Path, required=True)
-    parser.add_argument("--detector", type=pathlib.Path, help="instead of the program's own")
-    parser.add_argument("--integers", action="store_true", help="as `yfslam detect --integers` finds them")
+    parser.add_argument("--detector", type=pathlib.Path, help="model file (default: the embedded model)")
+    parser.add_argument("--integers", action="store_true", help="run `yfslam detect --integers`")
     options = parser.parse_args()
     own = ["--detector", options.detector] * bool(options.detector) + ["--integers"] * options.integers
     cache = Cache(options.cache, ["person"], held_out=True)

@@ -2,8 +2,8 @@
 
     python -m train.worlds OUT --count 250 --program target/release/yfslam
 
-Every setting is drawn from a generator seeded with the recording's number, so the same command writes the same pictures. Frames lie
-more than a second apart. Recordings that are there already are kept.
+Every setting is drawn from a generator seeded with the number of the recording, so that the same command writes the same images.
+Frames are more than a second apart. Existing recordings are kept.
 """
 
 import argparse
@@ -14,7 +14,8 @@ import numpy as np
 
 
 def spec(number, rng, empty, share):
-    """The text that names a world: `empty` of all have no people, else people cover `share` (least, most) of the picture."""
+    """Returns the description of a world: a share `empty` of them have no people, in the others people cover `share` (least, most)
+    of the image."""
     people = 0 if rng.random() < empty else int(rng.integers(1, 6))
     keys = {
         "seed": number + 1,
@@ -39,7 +40,7 @@ def main():
     parser.add_argument("--count", type=int, default=250)
     parser.add_argument("--first", type=int, default=0, help="number of the first recording")
     parser.add_argument("--empty", type=float, default=0.2, help="share of recordings without people")
-    parser.add_argument("--share", type=float, nargs=2, default=[0.1, 0.6], help="part of the picture that people cover, least and most")
+    parser.add_argument("--share", type=float, nargs=2, default=[0.1, 0.6], help="share of the image that people cover, least and most")
     parser.add_argument("--program", default="yfslam")
     options = parser.parse_args()
     for number in range(options.first, options.first + options.count):

@@ -117,10 +117,10 @@ impl From<&AssociationReport> for Association {
     fn from(report: &AssociationReport) -> Self {
         Self {
             color_listed: report.color_listed,
-            companions_listed: report.companions_listed,
+            companions_listed: report.paired_images_listed,
             paired: report.paired,
             color_unmatched: report.color_unmatched,
-            companions_unmatched: report.companions_unmatched,
+            companions_unmatched: report.paired_images_unmatched,
             duplicate_stamps_skipped: report.duplicates_skipped,
             backward_stamps_skipped: report.backward_skipped,
             unstamped_skipped: report.unstamped_skipped,

@@ -108,8 +108,8 @@ fn a_folder_in_use_is_left_alone_unless_it_is_a_recording_and_may_be_replaced() 
     let small = "walking_static?people=0&width=64&height=48&frames=3";
     fs::create_dir(root.join("mine")).unwrap();
     fs::write(root.join("mine/thesis.txt"), "years").unwrap();
-    fails(root, &["synth", small, "--out", "mine"], &["mine", "holds something already", "--force"]);
-    fails(root, &["synth", small, "--out", "mine", "--force"], &["is no recording"]);
+    fails(root, &["synth", small, "--out", "mine"], &["mine", "is not empty", "--force"]);
+    fails(root, &["synth", small, "--out", "mine", "--force"], &["is not a recording"]);
     assert_eq!(fs::read_to_string(root.join("mine/thesis.txt")).unwrap(), "years");
     fs::create_dir(root.join("rec")).unwrap();
     succeeds(root, &["synth", small, "--out", "rec"]);

@@ -1,4 +1,4 @@
-//! Times the forward pass and the whole `detect` on one thread: process CPU time of every run, as one JSON line per
+//! Measures the forward pass and the whole `detect` on one thread: process CPU time of every run, as one line of JSON per
 //! instruction set; `benches/peers_detector.py` compares it with other engines.
 //!
 //! `cargo run --release -p yfslam-detect --example time_detector -- model.onnx [runs [integers]]`
@@ -14,7 +14,8 @@ use yfslam_detect::{DetectorConfig, YoloFastestV2, available_levels};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let model = arguments.next().ok_or("the path of an ONNX model is missing")?;
+    let model =
+        arguments.next().ok_or("the path of an ONNX model is missing; usage: time_detector MODEL [RUNS [integers]]")?;
     let runs: usize = arguments.next().map_or(Ok(200), |runs| runs.parse())?;
     let integers = arguments.next().is_some_and(|word| word == "integers");
     let pixels = (0..640 * 480_usize).map(|index| [index, index / 7, index / 640].map(|value| value as u8)).collect();
@@ -24,9 +25,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut detector = YoloFastestV2::load(Path::new(&model), &config)?.with_level(level);
         let (height, width) = detector.input_size();
         let input: Vec<f32> = (0..3 * height * width).map(|index| (index * 37 % 256) as f32 / 255.0).collect();
-        let mut found = Vec::new();
+        let mut detections = Vec::new();
         let forward = time(runs, || detector.forward(&input))?;
-        let detect = time(runs, || detector.detect(&image, &mut found))?;
+        let detect = time(runs, || detector.detect(&image, &mut detections))?;
         let level = format!("{level:?}");
         let level = level.split('(').next().unwrap_or_default();
         println!("{{\"level\": \"{level}\", \"forward_all_ms\": {forward:?}, \"detect_all_ms\": {detect:?}}}");
@@ -34,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// CPU time of each of `runs` calls, ms, after some to warm up.
+/// Returns the CPU time of each of `runs` calls, ms, after ten calls to warm up.
 fn time<E>(runs: usize, mut call: impl FnMut() -> Result<(), E>) -> Result<Vec<f64>, E> {
     (0..10).try_for_each(|_| call())?;
     let once = |_| {

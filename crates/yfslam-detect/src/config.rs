@@ -1,26 +1,27 @@
-//! What can be set about the detector.
+//! Configuration of the detector.
 
 use serde::{Deserialize, Serialize};
 
-/// Settings of the detector; unknown keys are refused.
+/// Configuration of the detector; unknown keys are refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DetectorConfig {
-    /// Least score of a reported object, in (0, 1). Score = objectness · class probability. Source: the network's own demo.
+    /// Least score of a detection, in (0, 1). Score = objectness · class probability. Source: the demo program of the network.
     pub score_threshold: f32,
-    /// Of two boxes of one class whose intersection over union exceeds this, in (0, 1], only the better one is reported. The
-    /// network's own demo has 0.4; with 0.5 more of people who stand close together are found.
+    /// Two boxes of one class are the same object if their intersection over union exceeds this, in (0, 1]; the one with the lower
+    /// score is dropped. The demo program of the network has 0.4; with 0.5 more people who stand close together are found.
     pub iou_threshold: f32,
-    /// A reported box is the mean, weighed by their scores, of those found boxes of its class whose intersection over union with it
-    /// exceeds this, in (0, 1]; 1: it stays as it is. YOLO-FastestV2 alone. Source: Gidaris and Komodakis, ICCV 2015, section 4.3 (box voting).
+    /// A detected box is the mean, weighted by score, of the boxes of its class whose intersection over union with it exceeds this,
+    /// in (0, 1]; with 1 it stays unchanged. YOLO-FastestV2 only. Source: Gidaris and Komodakis, ICCV 2015, section 4.3 (box
+    /// voting).
     pub fuse_iou: f32,
-    /// Width and height of the anchors, px of the network input, for the fine grid (stride 16), then for the coarse one
-    /// (stride 32). Empty: those that the model file names, else those of the official COCO model.
+    /// Width and height of the anchors, px of the network input, for the fine grid (stride 16), then for the coarse one (stride
+    /// 32). If empty, those of the model file are used, else those of the official COCO model.
     pub anchors: Vec<Vec<[f32; 2]>>,
-    /// Whether 1×1 convolutions are computed with integers of 8 bits, in models that say how (`python -m train.quantize`): a little less
-    /// accurate; faster where the processor has AVX-512 VNNI, many times slower elsewhere.
+    /// Whether 1×1 convolutions are computed with 8-bit integers, for models with scales for this (`python -m train.quantize`):
+    /// slightly less accurate; faster on processors with AVX-512 VNNI, many times slower on others.
     pub integers: bool,
-    /// Names of the classes. Empty: those that the model file names, else, for 80 classes, those of COCO.
+    /// Names of the classes. If empty, those of the model file are used, else, for 80 classes, those of COCO.
     pub class_names: Vec<String>,
 }
 
@@ -37,100 +38,33 @@ impl Default for DetectorConfig {
     }
 }
 
-/// Anchors of the official model, px of its 352 × 352 input: k-means centres of the boxes of COCO.
-pub(crate) const COCO_ANCHORS: [[[f32; 2]; 3]; 2] =
-    [[[12.64, 19.39], [37.88, 51.48], [55.71, 138.31]], [[126.91, 78.23], [131.57, 214.55], [279.92, 258.87]]];
-
-/// The 80 classes of COCO (Lin et al., ECCV 2014) in the order of their ids.
-pub(crate) const COCO_NAMES: [&str; 80] = [
-    "person",
-    "bicycle",
-    "car",
-    "motorcycle",
-    "airplane",
-    "bus",
-    "train",
-    "truck",
-    "boat",
-    "traffic light",
-    "fire hydrant",
-    "stop sign",
-    "parking meter",
-    "bench",
-    "bird",
-    "cat",
-    "dog",
-    "horse",
-    "sheep",
-    "cow",
-    "elephant",
-    "bear",
-    "zebra",
-    "giraffe",
-    "backpack",
-    "umbrella",
-    "handbag",
-    "tie",
-    "suitcase",
-    "frisbee",
-    "skis",
-    "snowboard",
-    "sports ball",
-    "kite",
-    "baseball bat",
-    "baseball glove",
-    "skateboard",
-    "surfboard",
-    "tennis racket",
-    "bottle",
-    "wine glass",
-    "cup",
-    "fork",
-    "knife",
-    "spoon",
-    "bowl",
-    "banana",
-    "apple",
-    "sandwich",
-    "orange",
-    "broccoli",
-    "carrot",
-    "hot dog",
-    "pizza",
-    "donut",
-    "cake",
-    "chair",
-    "couch",
-    "potted plant",
-    "bed",
-    "dining table",
-    "toilet",
-    "tv",
-    "laptop",
-    "mouse",
-    "remote",
-    "keyboard",
-    "cell phone",
-    "microwave",
-    "oven",
-    "toaster",
-    "sink",
-    "refrigerator",
-    "book",
-    "clock",
-    "vase",
-    "scissors",
-    "teddy bear",
-    "hair drier",
-    "toothbrush",
-];
+impl DetectorConfig {
+    /// Refuses values out of range.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let Self { score_threshold, iou_threshold, fuse_iou, anchors, .. } = self;
+        if !(*score_threshold > 0.0 && *score_threshold < 1.0) {
+            return Err(format!("score_threshold = {score_threshold} must lie between 0 and 1"));
+        }
+        if !(*iou_threshold > 0.0 && *iou_threshold <= 1.0) {
+            return Err(format!("iou_threshold = {iou_threshold} must lie between 0 and 1"));
+        }
+        if !(*fuse_iou > 0.0 && *fuse_iou <= 1.0) {
+            return Err(format!("fuse_iou = {fuse_iou} must lie between 0 and 1"));
+        }
+        let wrong = |anchor: &&[f32; 2]| anchor.iter().any(|side| !(side.is_finite() && *side > 0.0));
+        match anchors.iter().flatten().find(wrong) {
+            Some(anchor) => Err(format!("anchors: {anchor:?} must be a width and a height above 0 px")),
+            None => Ok(()),
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn settings_survive_writing_and_reading_and_unknown_keys_are_refused() {
+    fn a_configuration_is_the_same_after_json_and_unknown_keys_are_refused() {
         let config =
             DetectorConfig { score_threshold: 0.1, anchors: vec![vec![[1.0, 2.0]]], ..DetectorConfig::default() };
         let text = serde_json::to_string(&config).unwrap();

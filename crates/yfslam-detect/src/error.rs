@@ -1,27 +1,27 @@
-//! Why a model could not be loaded: always the file, the place in it, and the cure.
+//! Errors of loading a model: every message names the file, the place in it, and what to do.
 
-/// Why a network file was refused.
+/// Why a model file was refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
     /// The file could not be read from disk.
-    #[error("cannot read the model {path}: {source}")]
+    #[error("cannot read the model {path}: {source}; check the path")]
     Io {
-        /// The path as given.
+        /// The path.
         path: String,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The bytes are no ONNX model, or they end too early.
+    /// The bytes are not an ONNX model, or they end too early.
     #[error(
         "{model} is not a readable ONNX model: {what}; export it again, or fetch the file again if it was cut short"
     )]
     NotOnnx {
         /// Name of the model.
         model: String,
-        /// What was found.
+        /// What is wrong with it.
         what: String,
     },
-    /// The graph holds something this runtime does not compute.
+    /// The graph has an operator that this engine does not compute.
     #[error(
         "{model}: node \"{node}\" ({op}): {what}; this runtime computes the YOLO-FastestV2 architecture only: \
          convolutions 1×1, depthwise and one 3×3 stem, ReLU, batch norm, max pool 3/2/1, concat, channel shuffle and \
@@ -35,7 +35,7 @@ pub enum ModelError {
         node: String,
         /// ONNX operator of the node.
         op: String,
-        /// What about it is not supported.
+        /// What is not supported.
         what: String,
     },
     /// Model and configuration do not fit each other, or a value is out of range.
@@ -43,7 +43,7 @@ pub enum ModelError {
     Mismatch {
         /// Name of the model.
         model: String,
-        /// What does not fit, and the cure.
+        /// What does not fit, and what to do.
         what: String,
     },
 }

@@ -1,9 +1,9 @@
-//! Finds people and things in an image: YOLO-FastestV2 on the CPU, one thread, no dependencies on other runtimes.
+//! Detects people and objects in images: YOLO-FastestV2 on the CPU, on one thread, without another runtime.
 //!
 //! ```text
-//! model.onnx ─► onnx (protobuf) ─► graph (fused layers) ─► plan (memory, offsets)
-//!                                                             │
-//! RgbImage ─► preprocess (stretch, BGR) ─────────────────► run (kernels) ─► decode (anchors, NMS) ─► boxes
+//! model.onnx ─► engine: onnx (protobuf) ─► graph (fused layers) ─► plan (memory, offsets)
+//!                                                                     │
+//! RgbImage ─► yolo: preprocess (stretch, BGR) ──────────────────► run (kernels) ─► yolo: decode (anchors, NMS) ─► boxes
 //! ```
 //!
 //! ```no_run
@@ -13,36 +13,37 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let image = yfslam::image::RgbImage::new(640, 480);
 //! let mut detector = YoloFastestV2::load("model.onnx".as_ref(), &DetectorConfig::default())?; // or YoloFastestV2::embedded
-//! let mut found = Vec::new();
-//! detector.detect(&image, &mut found)?;
+//! let mut detections = Vec::new();
+//! detector.detect(&image, &mut detections)?;
 //! # Ok(()) }
 //! ```
 //!
-//! With the feature `rten`, `AnyYolo` runs YOLO networks of other architectures, slower and on all cores; [`load()`] takes whatever there is.
+//! With the feature `rten`, `AnyYolo` runs YOLO networks of other architectures, more slowly and on all cores; [`load()`] chooses
+//! between them by the file.
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "rten")]
 mod any_yolo;
 mod config;
-mod decode;
 mod embedded;
+mod engine; // the inference engine: ONNX graph → plan of fused layers → kernels
 mod error;
-mod graph;
-mod kernels;
 mod load;
-mod memory;
-mod onnx;
-mod places;
-mod plan;
-mod preprocess;
+mod network;
 mod yolo;
 
 #[cfg(feature = "rten")]
 pub use any_yolo::AnyYolo;
 pub use config::DetectorConfig;
 pub use embedded::EMBEDDED_MODEL;
+pub use engine::kernels::available_levels;
 pub use error::ModelError;
 pub use fearless_simd::Level;
-pub use kernels::available_levels;
-pub use load::{Network, load};
+pub use load::load;
+pub use network::Network;
 pub use yolo::{RawOutput, YoloFastestV2};
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,30 +1,21 @@
-//! From the contents of a model file to whatever runs it.
+//! Chooses the runtime for a model file by its contents.
 
-use yfslam::Detector;
-use yfslam::image::Image;
+#[cfg(feature = "rten")]
+use crate::any_yolo::AnyYolo;
+use crate::config::DetectorConfig;
+use crate::error::ModelError;
+use crate::network::Network;
+use crate::yolo::YoloFastestV2;
 
-use crate::{DetectorConfig, ModelError, YoloFastestV2};
-
-/// A network that finds objects, and may tell which pixels show which of them.
-pub trait Network: Detector {
-    /// Which object each pixel of the image seen last shows: 0 for none, else 1 + its place in what [`Detector::detect`] gave; where
-    /// several lie one over another, the best. `None` from networks that find boxes alone.
-    fn objects(&self) -> Option<&Image<u16>> {
-        None
-    }
-}
-
-impl Network for YoloFastestV2 {}
-
-/// Reads the contents of an ONNX file: YOLO-FastestV2 for this crate's own runtime or, with the feature `rten`, another YOLO network.
-/// `name` is what errors call it.
+/// Loads a network from the contents of an ONNX file: YOLO-FastestV2 with this crate's own engine or, with the feature `rten`, another
+/// YOLO network. `name` stands for the file in error messages.
 ///
 /// # Errors
-/// As [`YoloFastestV2::load`].
+/// As for [`YoloFastestV2::load`].
 pub fn load(name: &str, bytes: &[u8], config: &DetectorConfig) -> Result<Box<dyn Network>, ModelError> {
     match YoloFastestV2::from_bytes(name, bytes, config) {
         #[cfg(feature = "rten")]
-        Err(ModelError::Unsupported { .. }) => Ok(Box::new(crate::AnyYolo::from_bytes(name, bytes, config)?)),
+        Err(ModelError::Unsupported { .. }) => Ok(Box::new(AnyYolo::from_bytes(name, bytes, config)?)),
         own => Ok(Box::new(own?)),
     }
 }

@@ -1,4 +1,4 @@
-//! The detector runs in the per-frame path: after the first image of a size it allocates nothing.
+//! The detector runs for every frame: after the first image of a size it allocates nothing.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
@@ -33,7 +33,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Allocations made by `work`.
+/// Counts the allocations of `work`.
 fn allocations(work: impl FnOnce()) -> usize {
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     work();
@@ -44,9 +44,9 @@ fn image(width: usize, height: usize, pixel: impl Fn(usize) -> u8) -> RgbImage {
     RgbImage::from_vec(width, height, (0..width * height).map(|index| [pixel(index); 3]).collect()).unwrap()
 }
 
-/// All networks in one test: the count is of all threads.
+/// All networks are in one test, because the count is that of all threads.
 #[test]
-fn detecting_allocates_nothing_after_the_first_image_of_a_size_however_much_the_next_one_holds() {
+fn detecting_allocates_nothing_after_the_first_image_of_a_size_however_many_objects_the_next_one_shows() {
     assert!(allocations(|| drop(vec![1_u8])) > 0, "the counter counts");
     let net = Net::yolo(&Size { height: 64, width: 64, channels: 4, classes: 80 }, Style::Folded, 1);
     let config = DetectorConfig { score_threshold: 0.1, ..DetectorConfig::default() };
@@ -57,7 +57,7 @@ fn detecting_allocates_nothing_after_the_first_image_of_a_size_however_much_the_
     for (mut detector, width, height, blank) in
         [(random, 30, 20, 0), (embedded, 640, 480, 200), (integers, 640, 480, 200)]
     {
-        // Something upright before a grained wall.
+        // A vertical bar in front of a textured wall.
         let figure = |index: usize| {
             let (x, y) = (index % width * 100 / width, index / width * 100 / height);
             if x.abs_diff(50) < 12 && y > 20 { (index % 97) as u8 } else { 150 + (index % 101) as u8 }
@@ -69,7 +69,7 @@ fn detecting_allocates_nothing_after_the_first_image_of_a_size_however_much_the_
 
         let made = allocations(|| (0..10).for_each(|_| detector.detect(&next, &mut found).unwrap()));
         assert_eq!(made, 0, "{width}×{height}");
-        // Nothing in the first image, so that nothing was made room for by finding it.
+        // The first image is empty, so that no detection in it could reserve memory.
         assert!(few == 0 && !found.is_empty(), "{few} boxes, then {}", found.len());
     }
 }

@@ -1,4 +1,4 @@
-//! Whatever is not a usable model, configuration or image is refused with words that help; nothing panics.
+//! Unusable models, configurations and images are refused with a message that says what to do, and without a panic.
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 mod common;
@@ -28,8 +28,8 @@ fn photo() -> RgbImage {
     RgbImage::from_vec(100, 70, pixels).unwrap()
 }
 
-/// Loads `bytes` and, where that succeeds, runs the network; the error's words.
-fn words(bytes: &[u8]) -> String {
+/// Loads `bytes` and, if that succeeds, runs the network; returns the error message.
+fn message(bytes: &[u8]) -> String {
     match YoloFastestV2::from_bytes("test.onnx", bytes, &config()) {
         Ok(mut detector) => {
             detector.detect(&photo(), &mut Vec::new()).unwrap();
@@ -39,28 +39,28 @@ fn words(bytes: &[u8]) -> String {
     }
 }
 
-/// What is said about a network that was changed by `change`.
-fn words_after(change: impl FnOnce(&mut Net)) -> String {
+/// Returns the error message for a network that was changed by `change`.
+fn message_after(change: impl FnOnce(&mut Net)) -> String {
     let mut net = net();
     change(&mut net);
-    words(&net.to_onnx())
+    message(&net.to_onnx())
 }
 
 #[test]
-fn what_is_no_onnx_file_is_called_so() {
+fn a_file_of_another_format_is_refused() {
     let png = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', 0, 0, 0, 13, b'I', b'H', b'D', b'R'];
     for bytes in [&[][..], &png, b"hello", &[0; 100], &[0xff; 100]] {
-        let words = words(bytes);
-        assert!(words.contains("test.onnx is not a readable ONNX model"), "{words}");
+        let message = message(bytes);
+        assert!(message.contains("test.onnx is not a readable ONNX model"), "{message}");
     }
 }
 
 #[test]
 fn a_file_cut_short_at_any_point_is_refused() {
     let whole = net().to_onnx();
-    assert_eq!(words(&whole), "");
+    assert_eq!(message(&whole), "");
     for length in (0..whole.len()).step_by(whole.len() / 200) {
-        assert_ne!(words(&whole[..length]), "", "the first {length} of {} bytes", whole.len());
+        assert_ne!(message(&whole[..length]), "", "the first {length} of {} bytes", whole.len());
     }
 }
 
@@ -71,7 +71,7 @@ fn a_missing_file_is_named() {
 }
 
 #[test]
-fn what_the_runtime_cannot_compute_is_named_by_node_and_operator() {
+fn unsupported_operations_are_named_by_node_and_operator() {
     type Change = fn(&mut Net);
     let cases: [(&str, Change); 6] = [
         ("node \"relu1\" (Sigmoid): this operator is not supported", |net| net.nodes[1].op = "Sigmoid"),
@@ -90,20 +90,20 @@ fn what_the_runtime_cannot_compute_is_named_by_node_and_operator() {
         }),
     ];
     for (expected, change) in cases {
-        let words = words_after(change);
-        assert!(words.contains(expected) && words.contains("test.onnx"), "{words}");
-        assert!(words.contains("this runtime computes"), "the cure is missing: {words}");
+        let message = message_after(change);
+        assert!(message.contains(expected) && message.contains("test.onnx"), "{message}");
+        assert!(message.contains("this runtime computes"), "the remedy is missing: {message}");
     }
 }
 
 #[test]
 fn weights_that_are_not_finite_are_refused() {
     for poison in [f32::NAN, f32::INFINITY] {
-        let words = words_after(|net| {
+        let message = message_after(|net| {
             let Some(Constant::Floats(_, values)) = net.constants.get_mut("weight4") else { unreachable!() };
             values[1] = poison;
         });
-        assert!(words.contains("constant \"weight4\" holds values that are not finite"), "{words}");
+        assert!(message.contains("constant \"weight4\" has values that are not finite"), "{message}");
     }
 }
 
@@ -120,7 +120,7 @@ fn a_model_that_does_not_fit_the_configuration_is_refused() {
         ("iou_threshold = 0", DetectorConfig { iou_threshold: 0.0, ..config() }),
         ("fuse_iou = NaN", DetectorConfig { fuse_iou: f32::NAN, ..config() }),
         ("anchors: [-1.0, 2.0]", DetectorConfig { anchors: vec![vec![[-1.0, 2.0]]], ..config() }),
-        ("it does not say how to compute with integers", DetectorConfig { integers: true, ..config() }),
+        ("it has no scales for computing with integers", DetectorConfig { integers: true, ..config() }),
         ("anchors for 1", DetectorConfig { anchors: vec![vec![[1.0, 2.0]]], ..config() }),
         (
             "with 1 anchors [4, 1, classes] is expected",
@@ -128,13 +128,13 @@ fn a_model_that_does_not_fit_the_configuration_is_refused() {
         ),
     ];
     for (expected, config) in cases {
-        let words = load(config);
-        assert!(words.contains(expected), "{words}");
+        let message = load(config);
+        assert!(message.contains(expected), "{message}");
     }
 }
 
 #[test]
-fn scales_that_cannot_be_are_refused() {
+fn malformed_scales_are_refused() {
     for line in ["conv4 0.1", "conv4 0 128", "conv4 NaN 128", "conv4 0.1 256", "conv4 0.1 -1", "0.1 1"] {
         let mut net = net();
         net.metadata = vec![("scales", format!("conv1 0.1 0\n{line}"))];
@@ -192,7 +192,7 @@ static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// Half of the damage goes to the first bytes, where the structure is; weights fill the rest.
+    /// Half of the damage is in the first bytes, which have the structure; the rest are weights.
     #[test]
     fn damaged_files_never_cause_a_panic(
         damage in prop::collection::vec((any::<bool>(), any::<prop::sample::Index>(), any::<u8>()), 1..6),

@@ -1,4 +1,4 @@
-//! The official COCO weights give what ONNX Runtime gives (numbers from `make_golden.py`); skipped where the data is absent.
+//! The official COCO weights give the same results as in ONNX Runtime (numbers from `make_golden.py`); skipped without the data.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests fail and report as tests do")]
 
 use std::path::{Path, PathBuf};
@@ -73,7 +73,7 @@ fn golden() -> Golden {
     serde_json::from_str(include_str!("golden.json")).unwrap()
 }
 
-/// The folder with real data, or `None` after saying so.
+/// Returns the folder with real data; prints a message and returns `None` if it is missing.
 fn data() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let data = std::env::var_os("YFSLAM_DATA").map_or(beside, PathBuf::from);
@@ -142,8 +142,8 @@ fn read_image(path: &Path) -> RgbImage {
     RgbImage::from_vec(width, height, pixels.as_chunks::<3>().0.to_vec()).unwrap()
 }
 
-/// WebP photos are decoded to the same pixels here and there. JPEG decoders differ in how they upsample chroma, by a tenth of a
-/// grey level on average, which may also decide which of two overlapping boxes wins: there objects are compared, not corners.
+/// WebP photos are decoded to the same pixels by both programs. JPEG decoders differ in the upsampling of chroma, by a tenth of a
+/// grey level on average, which may also decide which of two overlapping boxes wins: for them objects are compared and not corners.
 #[test]
 fn boxes_on_real_images_equal_those_of_onnx_runtime() {
     let Some(data) = data() else { return };

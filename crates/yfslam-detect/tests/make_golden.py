@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes tests/golden.json: what ONNX Runtime gives for the official COCO weights, as numbers to compare with.
+"""Writes tests/golden.json: the results of ONNX Runtime for the official COCO weights, for comparison.
 
 python3 make_golden.py DATA_FOLDER > golden.json     (pip: onnxruntime, opencv-python-headless, numpy)
 
-resize: samples of what OpenCV makes of procedural images, blue, green, red in [0, 1]
+resize: samples of procedural images resized by OpenCV, blue, green, red in [0, 1]
 raw:    procedural inputs, exact in float32; sums and samples of the six outputs
 boxes:  photos and video frames; resize by OpenCV on float pixels, decoding and suppression written here in numpy
 """

@@ -1,4 +1,4 @@
-//! The whole path from ONNX bytes to raw outputs, on a network made on the spot, against a naive executor.
+//! The whole path from ONNX bytes to raw outputs, on a generated network, compared with a naive executor.
 #![allow(clippy::expect_used, reason = "helpers of tests fail as tests do")]
 
 mod common;
@@ -21,7 +21,7 @@ fn image(size: &Size, seed: u64) -> Vec<f32> {
     (0..3 * size.height * size.width).map(|_| random(&mut state)).collect()
 }
 
-/// Runs `net` at `level`; all outputs in one list.
+/// Runs `net` at `level`; returns all outputs in one list.
 fn run(net: &Net, classes: usize, image: &[f32], level: Level) -> Vec<f32> {
     let detector = YoloFastestV2::from_bytes("synthetic", &net.to_onnx(), &config(classes));
     let mut detector = detector.expect("the synthetic network loads").with_level(level);
@@ -43,12 +43,12 @@ fn check(size: &Size, style: Style, seed: u64) {
 }
 
 #[test]
-fn every_level_computes_what_the_operators_are_defined_to_compute() {
+fn every_level_computes_the_operators_as_defined() {
     check(&Size { height: 96, width: 96, channels: 24, classes: 80 }, Style::Folded, 1);
 }
 
 #[test]
-fn every_spelling_of_the_graph_gives_the_same_network() {
+fn every_form_of_the_graph_gives_the_same_network() {
     for style in [Style::Folded, Style::Unfolded, Style::Split] {
         check(&Size { height: 64, width: 96, channels: 8, classes: 3 }, style, 2);
     }
@@ -67,13 +67,13 @@ fn weights_stored_in_16_bits_give_the_same_bits_as_the_same_weights_in_32() {
 }
 
 #[test]
-fn sizes_and_channels_that_fill_no_vector_are_computed_right() {
+fn sizes_and_channels_that_fill_no_vector_are_computed_correctly() {
     for (height, width, channels, classes) in [(32, 32, 1, 1), (32, 160, 5, 2), (224, 32, 7, 13), (96, 160, 24, 4)] {
         check(&Size { height, width, channels, classes }, Style::Folded, 3);
     }
 }
 
-/// On each line of the metadata the name of a 1×1 convolution, the step and the zero of what it reads.
+/// Returns metadata with, on each line, the name of a 1×1 convolution and the step and the zero of its input.
 fn scales(net: &Net, image: &[f32]) -> String {
     let line = |(name, low, high): (&str, f64, f64)| {
         let step = (high - low) / 255.0;
@@ -83,7 +83,7 @@ fn scales(net: &Net, image: &[f32]) -> String {
 }
 
 #[test]
-fn integers_give_the_same_bits_at_every_level_and_nearly_what_floats_give() {
+fn integers_give_the_same_bits_at_every_level_and_nearly_the_results_of_floats() {
     let size = Size { height: 96, width: 160, channels: 24, classes: 4 };
     let (mut net, image) = (Net::yolo(&size, Style::Folded, 8), image(&size, 9));
     net.metadata = vec![("scales", scales(&net, &image))];
@@ -94,7 +94,7 @@ fn integers_give_the_same_bits_at_every_level_and_nearly_what_floats_give() {
         detector.forward(&image).expect("the image has the right size");
         detector.raw_outputs().into_iter().flat_map(|output| output.values).collect::<Vec<f32>>()
     };
-    // The layers in floats round in their own way where nothing is fused.
+    // Float layers round in their own way on levels without fused operations.
     let fused = |level: &Level| ["Avx", "Neon"].iter().any(|name| format!("{level:?}").starts_with(name));
     let mut outputs = available_levels().into_iter().filter(fused).map(|level| run(true, level));
     let Some(first) = outputs.next() else { return };

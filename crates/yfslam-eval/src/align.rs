@@ -1,4 +1,4 @@
-//! In: matched poses. Out: the transform that brings the estimate closest to the reference, and the absolute trajectory error.
+//! In: matched poses. Out: the transform that aligns the estimate with the reference, and the absolute trajectory error.
 //!
 //! Minimises Σ ‖r − (s R e + t)‖² in closed form: rotation by the largest eigenvector of the quaternion matrix of Horn, "Closed-form
 //! solution of absolute orientation using unit quaternions", JOSA A 1987, §4; scale as in Umeyama, TPAMI 1991, equation 42.
@@ -8,9 +8,9 @@ use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, SymmetricEigen, UnitQuat
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Eigenvalue gap, as a fraction of the largest eigenvalue, below which the rotation is noise: 1 µm across for each metre along.
+/// Eigenvalue gap, as a fraction of the largest eigenvalue, below which the rotation is undetermined: 1 µm across for each metre along.
 const MIN_RELATIVE_GAP: f64 = 1e-12;
-/// Spread, as a fraction of the distance from the origin (1 m at least), below which positions are one point up to rounding.
+/// Spread, as a fraction of the distance from the origin (1 m at least), below which all positions are equal up to rounding.
 const MIN_RELATIVE_SPREAD: f64 = 1e-9;
 
 /// Which transforms the alignment may use.
@@ -20,7 +20,7 @@ pub enum AlignmentKind {
     /// Rotation and translation: for sensors that measure scale, such as RGB-D.
     #[default]
     Se3,
-    /// Rotation, translation and scale: for monocular estimates. It hides scale drift, so say so beside the figure.
+    /// Rotation, translation and scale: for monocular estimates. It hides the scale error, so state it beside the result.
     Sim3,
 }
 
@@ -36,7 +36,7 @@ impl fmt::Display for AlignmentKind {
 /// A transform from the world of the estimate into the world of the reference: x ↦ scale · rotation · x + translation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Alignment {
-    /// What the alignment was free to choose.
+    /// Degrees of freedom.
     pub kind: AlignmentKind,
     /// Rotation; serialised as x, y, z, w.
     pub rotation: UnitQuaternion<f64>,
@@ -47,14 +47,14 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// The estimated pose as it stands in the world of the reference.
+    /// Transforms an estimated pose into the world of the reference.
     pub fn apply(&self, pose: &StampedPose) -> StampedPose {
         let position = self.scale * (self.rotation * pose.t_world_cam.translation.vector) + self.translation;
         let rotation = self.rotation * pose.t_world_cam.rotation;
         StampedPose::new(pose.timestamp_ns, Isometry3::from_parts(position.into(), rotation))
     }
 
-    /// The matches with the lengths of the estimate in those of the reference, for errors that need no other part of the alignment.
+    /// Scales the estimated positions of the matches, for errors that need no other part of the alignment.
     pub fn scaled(&self, matches: &[Match]) -> Vec<Match> {
         let scaled = |pose: &StampedPose| {
             let mut pose = *pose;
@@ -83,10 +83,10 @@ pub struct Ate {
     pub translation_m: Statistics,
 }
 
-/// Finds the transform that brings the estimated positions closest, in the least squares sense, to the reference.
+/// Finds the transform that aligns the estimated positions with the reference in the least squares sense.
 ///
 /// # Errors
-/// Fewer than three matches; positions on a line or at a point.
+/// There are fewer than three matches, or the positions lie on a line or at a point.
 pub fn align(matches: &[Match], kind: AlignmentKind) -> Result<Alignment, EvalError> {
     if matches.len() < 3 {
         return Err(EvalError::TooFewMatches { found: matches.len(), needed: 3 });
@@ -120,7 +120,7 @@ pub fn align(matches: &[Match], kind: AlignmentKind) -> Result<Alignment, EvalEr
     Ok(Alignment { kind, rotation, translation: mean_r - scale * (rotation * mean_e), scale })
 }
 
-/// Absolute trajectory error of matched poses after alignment (Sturm et al. 2012, §V-B).
+/// Computes the absolute trajectory error of matched poses after alignment (Sturm et al. 2012, §V-B).
 ///
 /// # Errors
 /// Those of [`align`].
@@ -136,7 +136,7 @@ fn position(pose: &StampedPose) -> Vector3<f64> {
     pose.t_world_cam.translation.vector
 }
 
-/// Horn's symmetric matrix N, whose quadratic form in a unit quaternion (w, x, y, z) is Σ r · R e, from S = Σ e rᵀ.
+/// Returns Horn's symmetric matrix N, whose quadratic form in a unit quaternion (w, x, y, z) is Σ r · R e, from S = Σ e rᵀ.
 pub(crate) fn horn_matrix(s: &Matrix3<f64>) -> Matrix4<f64> {
     let (sxx, sxy, sxz) = (s.m11, s.m12, s.m13);
     let (syx, syy, syz) = (s.m21, s.m22, s.m23);

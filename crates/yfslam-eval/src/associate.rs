@@ -1,14 +1,14 @@
-//! In: two trajectories. Out: pairs of poses of (nearly) the same time.
+//! In: two trajectories. Out: pairs of poses at nearly the same time.
 //!
-//! Each pose of the trajectory with fewer poses (the estimate if they are equal) takes the pose of the other one with the nearest
-//! stamp, the earlier at a tie, if it is near enough. So a pose of the longer one can serve twice; `evo` does the same.
+//! Each pose of the trajectory with fewer poses (the estimate if they are equal) is matched with the pose of the other one that has the
+//! nearest stamp, the earlier in a tie, if it is within the tolerance. A pose of the longer trajectory can be matched twice, as in `evo`.
 //!
-//! Differences are taken in seconds as `f64`, as `evo` and the tools of the TUM benchmark do. With ground truth stamps of four decimals
-//! an estimate often lies exactly between two of them; rounding decides then, and only the same rounding gives the same matches.
+//! Differences are computed in seconds as `f64`, as in `evo` and the tools of the TUM benchmark. With ground truth stamps of four
+//! decimals an estimate often lies exactly between two of them; then rounding decides, and only the same rounding gives the same matches.
 
 use crate::{EvalError, StampedPose, Trajectory, pose};
 
-/// Tolerance of `evo` and our default, ns. Some recordings need more: the stamps of the Bonn ground truth are up to 20 ms off.
+/// Default tolerance, ns, as in `evo`. Some recordings need more: the stamps of the Bonn ground truth are up to 20 ms off.
 pub const DEFAULT_MAX_DIFF_NS: u64 = 10_000_000;
 
 /// A reference pose and an estimated pose of the same time.
@@ -25,7 +25,7 @@ pub struct Match {
 /// Returns at least one match, in order of time.
 ///
 /// # Errors
-/// Empty, unsorted or non-finite trajectories; no overlap in time; no match within the tolerance.
+/// A trajectory is empty, unsorted or not finite, they do not overlap in time, or there is no match within the tolerance.
 pub fn associate(
     reference: &[StampedPose],
     estimate: &[StampedPose],
@@ -58,18 +58,18 @@ pub fn associate(
     }
 }
 
-/// Indices of the last pose up to a time and of the first after it.
+/// Returns the indices of the last pose up to a time and of the first after it.
 fn around(sorted: &[StampedPose], timestamp_ns: i64) -> impl Iterator<Item = usize> {
     let after = sorted.partition_point(|p| p.timestamp_ns <= timestamp_ns);
     [after.checked_sub(1), Some(after)].into_iter().flatten().filter(|&i| i < sorted.len())
 }
 
-/// Index of the pose nearest in time, the earlier at a tie; `None` if there are no poses.
+/// Returns the index of the pose nearest in time, the earlier in a tie; `None` without poses.
 pub(crate) fn nearest(sorted: &[StampedPose], timestamp_ns: i64) -> Option<usize> {
     around(sorted, timestamp_ns).min_by_key(|&i| sorted.get(i).map(|p| p.timestamp_ns.abs_diff(timestamp_ns)))
 }
 
-/// A time as the nearest `f64`, s.
+/// Converts a time to the nearest `f64`, s.
 fn seconds(timestamp_ns: i64) -> f64 {
     let whole = timestamp_ns.div_euclid(1_000_000_000);
     whole as f64 + timestamp_ns.rem_euclid(1_000_000_000) as f64 / 1e9

@@ -1,4 +1,4 @@
-//! In: the frames of a sequence and the trajectories. Out: which part of the frames was tracked; an error figure means little without.
+//! In: the frames of a sequence and the trajectories. Out: the fraction of frames that were tracked, without which an error means little.
 
 use crate::associate::nearest;
 use crate::{EvalError, StampedPose};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// An estimated pose belongs to a frame if their stamps agree up to the rounding of trajectory files, ns.
 const SAME_FRAME_NS: u64 = 1_000_000;
 
-/// How many of the frames that could be judged were tracked.
+/// How many of the frames with a reference pose were tracked.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
     /// Frames with an estimated pose.
@@ -19,8 +19,8 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Counts, of the frames with a reference pose within `max_diff_ns`, those with an estimated pose; both trajectories are sorted
-    /// by time.
+    /// Counts the frames with a reference pose within `max_diff_ns`, and those of them with an estimated pose; both trajectories are
+    /// sorted by time.
     ///
     /// # Errors
     /// The reference covers no frame.
@@ -38,10 +38,10 @@ impl Coverage {
         Self::of_count(covered().filter(|&&t| has(estimate, t, SAME_FRAME_NS)).count(), covered().count())
     }
 
-    /// From the number of matched poses and the number of frames that the reference covers.
+    /// Computes the fraction from the number of matched poses and the number of frames that the reference covers.
     ///
     /// # Errors
-    /// No frame expected, or fewer than were matched.
+    /// No frames are expected, or fewer than were matched.
     pub fn of_count(tracked: usize, expected: usize) -> Result<Self, EvalError> {
         if expected == 0 || tracked > expected {
             return Err(EvalError::BadExpectation { tracked, expected });
@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_the_reference_does_not_cover_do_not_count() {
+    fn frames_without_a_reference_pose_do_not_count() {
         let frames_ns: Vec<i64> = (0..10).map(|i| i * 33_000_000).collect();
         let (reference, estimate) = (at_ms(&[0, 30, 60, 100]), at_ms(&[0, 66, 132, 165]));
         let coverage = Coverage::of_frames(&frames_ns, &reference, &estimate, 10_000_000).unwrap();

@@ -1,4 +1,4 @@
-//! What can be wrong with two trajectories, in words that name the values and the likely cure.
+//! Errors of the comparison of two trajectories: every message names the values and what to do.
 
 use std::fmt;
 use thiserror::Error;
@@ -25,39 +25,37 @@ impl fmt::Display for Trajectory {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum EvalError {
     /// A trajectory without poses.
-    #[error(
-        "the {trajectory} has no poses: check that its file is the right one and that the run got as far as a first pose"
-    )]
+    #[error("the {trajectory} has no poses: check that it is the right file and that the run reached a first pose")]
     Empty {
-        /// The one without poses.
+        /// The trajectory without poses.
         trajectory: Trajectory,
     },
     /// NaN, infinity, a position beyond 1e9 m or a rotation that is not a unit quaternion.
     #[error(
         "pose {index} of the {trajectory}, at {} s, is not finite, is beyond 1e9 m or has no unit quaternion: \
-         leave out poses of frames that were not tracked",
+         remove poses of frames that were not tracked",
         seconds(*timestamp_ns)
     )]
     BadPose {
-        /// The one with the bad pose.
+        /// The trajectory with the bad pose.
         trajectory: Trajectory,
         /// Index of the pose, from 0.
         index: usize,
         /// Its time, ns.
         timestamp_ns: i64,
     },
-    /// Time runs backwards.
+    /// Time runs backward.
     #[error("pose {index} of the {trajectory} is older than the one before it: sort the trajectory by time")]
     Unsorted {
-        /// The unsorted one.
+        /// The unsorted trajectory.
         trajectory: Trajectory,
         /// Index of the first pose that is older than its predecessor, from 0.
         index: usize,
     },
-    /// The time spans are apart.
+    /// The time spans do not overlap.
     #[error(
-        "no overlap in time: the reference covers {} to {} s, the estimate {} to {} s; either they are of different recordings, \
-         or of different clocks (then shift the estimate, by about {} s if both start together)",
+        "no overlap in time: the reference covers {} to {} s, the estimate {} to {} s; they are of different recordings, \
+         or of different clocks; in that case shift the estimate, by about {} s if both start together",
         seconds(reference_ns[0]), seconds(reference_ns[1]), seconds(estimate_ns[0]), seconds(estimate_ns[1]),
         seconds(reference_ns[0].saturating_sub(estimate_ns[0]))
     )]
@@ -67,16 +65,16 @@ pub enum EvalError {
         /// First and last time of the estimate, ns.
         estimate_ns: [i64; 2],
     },
-    /// The time spans overlap, yet no two stamps are close enough.
+    /// The time spans overlap, but no two stamps are close enough.
     #[error(
         "no two stamps are within {} ms of each other, the closest are {} ms apart: raise the tolerance if the reference is \
-         that sparse, else look for an offset between the clocks",
+         that sparse, or correct an offset between the clocks",
         *max_diff_ns as f64 / 1e6, *closest_ns as f64 / 1e6
     )]
     NoMatch {
-        /// Tolerance asked for, ns.
+        /// Requested tolerance, ns.
         max_diff_ns: u64,
-        /// Smallest difference there is, ns.
+        /// Smallest difference of two stamps, ns.
         closest_ns: u64,
     },
     /// Fewer matches than the metric needs.
@@ -85,9 +83,9 @@ pub enum EvalError {
          of the association"
     )]
     TooFewMatches {
-        /// Matches there are.
+        /// Number of matches.
         found: usize,
-        /// Matches needed.
+        /// Number of matches that are needed.
         needed: usize,
     },
     /// Positions that do not determine the rotation of the alignment.
@@ -106,9 +104,9 @@ pub enum EvalError {
         "a relative pose error over {delta} with tolerance {relative_tolerance} is undefined: give a positive delta and a tolerance of 0 or more"
     )]
     BadDelta {
-        /// The delta asked for.
+        /// The requested delta.
         delta: crate::Delta,
-        /// The tolerance asked for, as a fraction of the delta.
+        /// The requested tolerance, as a fraction of the delta.
         relative_tolerance: f64,
     },
     /// No two poses are that far apart.
@@ -117,9 +115,9 @@ pub enum EvalError {
          delta or a larger tolerance"
     )]
     NoPairs {
-        /// The delta asked for.
+        /// The requested delta.
         delta: crate::Delta,
-        /// Matched poses.
+        /// Number of matched poses.
         matches: usize,
         /// Time from the first to the last, s.
         duration_s: f64,
@@ -138,7 +136,7 @@ pub enum EvalError {
     },
 }
 
-/// A time in seconds, exact to the nanosecond.
+/// Formats a time in seconds, exact to the nanosecond.
 fn seconds(ns: i64) -> String {
     let sign = if ns < 0 { "-" } else { "" };
     format!("{sign}{}.{:09}", ns.unsigned_abs() / 1_000_000_000, ns.unsigned_abs() % 1_000_000_000)

@@ -6,25 +6,25 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Which frames the estimate should have posed.
+/// The frames that the estimate should have a pose for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExpectedFrames {
-    /// Not known: no tracked fraction.
+    /// Not known; there is no tracked fraction.
     #[default]
     Unknown,
-    /// Stamps of all frames of the sequence, ns; those without a reference pose are left out of the count.
+    /// Stamps of all frames of the sequence, ns; those without a reference pose do not count.
     StampsNs(Vec<i64>),
     /// Number of the frames that the reference covers.
     Count(usize),
 }
 
-/// What to measure, and how.
+/// Options of an evaluation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EvalOptions {
     /// Largest difference between the stamps of a match, ns.
     pub max_diff_ns: u64,
-    /// Alignment before the absolute trajectory error. Its scale, if it has one, is that of the relative errors, too.
+    /// Alignment before the absolute trajectory error. Its scale, if it has one, is also used for the relative errors.
     pub alignment: AlignmentKind,
     /// Relative pose errors to compute.
     pub rpe: Vec<RpeOptions>,
@@ -43,16 +43,16 @@ impl Default for EvalOptions {
     }
 }
 
-/// Every figure of one estimate.
+/// All errors of one estimate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
-    /// Poses of the reference.
+    /// Number of poses of the reference.
     pub reference_poses: usize,
-    /// Poses of the estimate.
+    /// Number of poses of the estimate.
     pub estimate_poses: usize,
-    /// Pairs of poses that were compared.
+    /// Number of pairs of poses that were compared.
     pub matches: usize,
-    /// Largest difference between the stamps of a match that was allowed, ns.
+    /// Largest allowed difference between the stamps of a match, ns.
     pub max_diff_ns: u64,
     /// Absolute trajectory error.
     pub ate: Ate,

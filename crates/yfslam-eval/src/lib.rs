@@ -32,3 +32,8 @@ pub use published::{Measure, Published, published};
 pub use rpe::{Delta, Rpe, RpeOptions, rpe};
 pub use statistics::{Statistics, improvement_percent};
 pub use table::{Table, TableStyle};
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

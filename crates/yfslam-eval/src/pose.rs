@@ -1,10 +1,10 @@
-//! In: poses from any reader or tracker. Out: the one pose type of this crate, and trajectories proven usable.
+//! The pose type of this crate, and the check of trajectories before they are compared.
 
 use crate::{EvalError, Trajectory};
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
-/// No recording reaches farther from its origin, m; below it no square or sum over poses overflows.
+/// Largest distance of a position from the origin, m; below it no square or sum over poses overflows.
 const MAX_DISTANCE_M: f64 = 1e9;
 
 /// Pose of the camera in the world at one time.
@@ -17,13 +17,13 @@ pub struct StampedPose {
 }
 
 impl StampedPose {
-    /// A pose at a time in ns; `t_world_cam` maps points of the camera frame into the world frame.
+    /// Creates a pose at a time in ns; `t_world_cam` maps points of the camera frame into the world frame.
     pub fn new(timestamp_ns: i64, t_world_cam: Isometry3<f64>) -> Self {
         Self { timestamp_ns, t_world_cam }
     }
 }
 
-/// Refuses what would silently spoil every figure: no poses, times that run backwards, NaN.
+/// Refuses trajectories without poses, with times that run backward, or with values that are not finite.
 pub(crate) fn check(poses: &[StampedPose], trajectory: Trajectory) -> Result<(), EvalError> {
     if poses.is_empty() {
         return Err(EvalError::Empty { trajectory });

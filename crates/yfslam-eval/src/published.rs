@@ -1,9 +1,9 @@
-//! Errors that papers have published for the dynamic sequences of the TUM RGB-D benchmark and of the Bonn data set.
+//! Published errors for the dynamic sequences of the TUM RGB-D benchmark and of the Bonn data set.
 //!
-//! In: the folder name of a sequence, as its data set ships it. Out: what others reported for the whole of it, on their machines. The
-//! figures are in `published.csv`, each with its source; a name that is not there has none.
+//! In: the original folder name of a sequence. Out: the errors that papers report for the whole sequence. The figures are in
+//! `published.csv`, each with its source.
 
-/// Which error a figure is of.
+/// The error that a figure states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
     /// Absolute trajectory error, m.
@@ -19,26 +19,26 @@ pub enum Measure {
 pub struct Published {
     /// Folder name of the sequence.
     pub sequence: &'static str,
-    /// What was measured.
+    /// The error.
     pub measure: Measure,
     /// The system.
     pub system: &'static str,
     /// Root of the mean square, in the unit of the measure.
     pub rmse: f64,
-    /// Standard deviation, where it was given.
+    /// Standard deviation, if the paper states it.
     pub std: Option<f64>,
-    /// Where it was published.
+    /// The publication.
     pub source: &'static str,
 }
 
 const FIGURES: &str = include_str!("published.csv");
 
-/// What was published about a sequence, in the order of the file.
+/// Returns the published figures of a sequence, in the order of the file.
 pub fn published(sequence: &str, measure: Measure) -> impl Iterator<Item = Published> {
     all().filter(move |figure| figure.sequence == sequence && figure.measure == measure)
 }
 
-/// Every figure of the file but those of a malformed line, which a test forbids.
+/// Returns all figures of the file except malformed lines, which a test excludes.
 fn all() -> impl Iterator<Item = Published> {
     FIGURES.lines().skip(1).filter_map(parse)
 }
@@ -67,7 +67,7 @@ mod tests {
     use crate::improvement_percent;
 
     #[test]
-    fn every_line_is_a_figure_and_no_system_has_two_for_one_sequence() {
+    fn every_line_is_a_figure_and_no_system_has_two_for_the_same_sequence() {
         assert_eq!(all().count(), FIGURES.lines().count() - 1);
         let mut keys: Vec<String> = all().map(|f| format!("{} {:?} {}", f.sequence, f.measure, f.system)).collect();
         keys.sort();
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_are_those_of_the_papers_and_only_of_the_sequence_that_is_asked_for() {
+    fn figures_are_those_of_the_papers_and_of_the_requested_sequence_only() {
         let find = |sequence: &str, measure, system: &str| {
             published(sequence, measure).find(|f| f.system == system).map(|f| (f.rmse, f.std))
         };
@@ -86,7 +86,11 @@ mod tests {
         assert_eq!(find(walking, Measure::Ate, "YF-SLAM"), Some((0.0156, Some(0.0086))));
         assert_eq!(find(walking, Measure::RpeRotation, "ORB-SLAM2"), Some((7.7846, Some(5.8335))));
         assert_eq!(find("rgbd_bonn_crowd", Measure::Ate, "NGD-SLAM"), Some((0.024, None)));
-        assert_eq!(find("rgbd_dataset_freiburg3_walking_rpy", Measure::Ate, "YF-SLAM"), None, "it has no such row");
+        assert_eq!(
+            find("rgbd_dataset_freiburg3_walking_rpy", Measure::Ate, "YF-SLAM"),
+            None,
+            "the paper has no such row"
+        );
         assert_eq!(published("bonn_crowd_dev", Measure::Ate).count(), 0);
         assert_eq!(published("walking_xyz", Measure::Ate).count(), 0);
         // The paper prints 98.27 %.

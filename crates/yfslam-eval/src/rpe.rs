@@ -1,20 +1,20 @@
 //! In: matched poses. Out: the relative pose error over a span of frames, seconds or metres.
 //!
 //! For a pair (i, j) of matches with reference poses Q and estimated poses P, the error is (Qᵢ⁻¹ Qⱼ)⁻¹ (Pᵢ⁻¹ Pⱼ) (Sturm et al. 2012,
-//! §V-A): its translation is the drift in m, its rotation angle the drift in degrees, over that span; no alignment is involved, save
-//! that the estimate of a single camera is brought to scale before ([`crate::Alignment::scaled`]).
+//! §V-A): its translation is the drift in m, its rotation angle the drift in degrees, over that span. No alignment is involved, except
+//! that the estimate of a single camera is scaled before ([`crate::Alignment::scaled`]).
 //!
-//! Which pairs: *all pairs* starts one at every match i, so that spans overlap; *consecutive* starts the next where the last ended.
+//! *All pairs* starts a pair at every match i, so that spans overlap; *consecutive* starts each pair at the end of the last one.
 //!
 //! | delta | j of a pair that starts at i |
 //! |---|---|
 //! | frames | i + delta. Frames are counted among the matches, so a gap in tracking counts as one step. |
-//! | seconds | the j > i whose estimate's stamp is nearest to that of i plus delta, the earlier at a tie, if it is within `relative_tolerance · delta` of it; if there is none, no pair starts at i |
-//! | metres, consecutive | the first with at least delta of path from i, the path being measured along the estimate |
+//! | seconds | the j > i whose estimated stamp is nearest to that of i plus delta, the earlier in a tie, if it is within `relative_tolerance · delta` of it; if there is none, no pair starts at i |
+//! | metres, consecutive | the first with at least delta of path from i, measured along the estimate |
 //! | metres, all pairs | the j > i whose path from i is nearest to delta, if it is within `relative_tolerance · delta` of it |
 //!
-//! Frames and metres select the pairs that `evo` selects. "Per second" (m/s, °/s in the papers) is all pairs at 1 s, as in the
-//! tool of the TUM benchmark at fixed delta; the error isn't divided by the exact time that passed.
+//! Frames and metres select the same pairs as `evo`. "Per second" (m/s, °/s in the papers) is all pairs at 1 s, as in the tool of the
+//! TUM benchmark with a fixed delta; the error is not divided by the exact time difference.
 
 use crate::associate::nearest;
 use crate::{EvalError, Match, StampedPose, Statistics};
@@ -44,30 +44,30 @@ impl fmt::Display for Delta {
     }
 }
 
-/// Which pairs to compare.
+/// Options of a relative pose error: which pairs are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RpeOptions {
     /// Span of a pair.
     pub delta: Delta,
-    /// Start a pair at every pose rather than where the last one ended.
+    /// Whether a pair starts at every pose and not at the end of the last pair.
     pub all_pairs: bool,
-    /// How far a span in seconds, or in metres with all pairs, may be off, as a fraction of delta. Source: 0.1 as in `evo`.
+    /// Tolerance of a span in seconds, or in metres with all pairs, as a fraction of delta. Source: 0.1 as in `evo`.
     pub relative_tolerance: f64,
 }
 
 impl RpeOptions {
-    /// Pairs of the given span and a tolerance of 0.1.
+    /// Selects pairs of the given span with a tolerance of 0.1.
     pub fn new(delta: Delta, all_pairs: bool) -> Self {
         Self { delta, all_pairs, relative_tolerance: 0.1 }
     }
 
-    /// Drift per frame: every pair of neighbours.
+    /// Selects all pairs of neighbours: drift per frame.
     pub fn per_frame() -> Self {
         Self::new(Delta::Frames(1), false)
     }
 
-    /// Drift per second: all pairs that are 1 s apart. The tolerance of 0.05 suits every frame rate from 10 Hz up and keeps out
-    /// spans cut short by a gap in tracking or by the end of the trajectory.
+    /// Selects all pairs that are 1 s apart: drift per second. The tolerance of 0.05 suits every frame rate from 10 Hz on and excludes
+    /// spans that are shortened by a gap in tracking or by the end of the trajectory.
     pub fn per_second() -> Self {
         Self { relative_tolerance: 0.05, ..Self::new(Delta::Seconds(1.0), true) }
     }
@@ -76,7 +76,7 @@ impl RpeOptions {
 /// Relative pose error over one span.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rpe {
-    /// Which pairs were compared.
+    /// The pairs that were compared.
     pub options: RpeOptions,
     /// Translations of the errors, m.
     pub translation_m: Statistics,
@@ -84,10 +84,10 @@ pub struct Rpe {
     pub rotation_deg: Statistics,
 }
 
-/// Relative pose error of matches, which are in order of time as [`crate::associate`] returns them.
+/// Computes the relative pose error of matches, which are in order of time as [`crate::associate`] returns them.
 ///
 /// # Errors
-/// Fewer than two matches; a delta or tolerance that makes no sense; no two poses that far apart.
+/// There are fewer than two matches, the delta or tolerance is out of range, or no two poses are that far apart.
 pub fn rpe(matches: &[Match], options: &RpeOptions) -> Result<Rpe, EvalError> {
     if matches.len() < 2 {
         return Err(EvalError::TooFewMatches { found: matches.len(), needed: 2 });
@@ -109,7 +109,7 @@ pub fn rpe(matches: &[Match], options: &RpeOptions) -> Result<Rpe, EvalError> {
     }
 }
 
-/// Translation (m) and rotation angle (degrees) of the relative pose error between two matches.
+/// Returns the translation (m) and rotation angle (degrees) of the relative pose error between two matches.
 fn error(from: &Match, to: &Match) -> (f64, f64) {
     let motion_reference = from.reference.t_world_cam.inv_mul(&to.reference.t_world_cam);
     let motion_estimate = from.estimate.t_world_cam.inv_mul(&to.estimate.t_world_cam);
@@ -117,7 +117,7 @@ fn error(from: &Match, to: &Match) -> (f64, f64) {
     (error.translation.vector.norm(), error.rotation.angle().to_degrees())
 }
 
-/// Where along the estimate each match lies, in time and in path.
+/// The place of each match along the estimate, in time and in path.
 struct Spans {
     poses: Vec<StampedPose>,
     path_m: Vec<f64>,
@@ -154,7 +154,7 @@ impl Spans {
         })
     }
 
-    /// The end of the pair that starts at `from`, always behind it.
+    /// Returns the end of the pair that starts at `from`; it is always after `from`.
     fn partner(&self, from: usize, options: &RpeOptions) -> Option<usize> {
         let to = match options.delta {
             Delta::Frames(n) => from.checked_add(n)?,

@@ -1,4 +1,4 @@
-//! In: one error per pose or pair. Out: the figures that tables report.
+//! In: one error per pose or pair. Out: the statistics in tables.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ pub struct Statistics {
     pub rmse: f64,
     /// Arithmetic mean.
     pub mean: f64,
-    /// Middle value; mean of the two middle ones if their number is even.
+    /// Median; the mean of the two middle values if the number is even.
     pub median: f64,
     /// Standard deviation about the mean, of the population (divided by `count`); the papers' "S.D.".
     pub std: f64,
@@ -22,7 +22,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Statistics of finite errors; `None` if there are none.
+    /// Computes the statistics of finite errors; `None` without errors.
     pub fn of(errors: &[f64]) -> Option<Self> {
         let mut sorted = errors.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -36,7 +36,7 @@ impl Statistics {
     }
 }
 
-/// Improvement of `ours` over `original` in percent, (1 − ours / original) · 100 (paper equation 3); negative if ours is worse.
+/// Returns the improvement of `ours` over `original` in percent, (1 − ours / original) · 100 (paper equation 3); negative if ours is worse.
 ///
 /// `None` if it is undefined: an original error of zero, or an error that is negative or not finite.
 pub fn improvement_percent(ours: f64, original: f64) -> Option<f64> {

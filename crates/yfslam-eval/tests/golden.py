@@ -1,4 +1,4 @@
-"""Makes golden.csv: figures of the tool `evo` (pip install evo==1.38.1) for the trajectories that its golden test reads.
+"""Writes golden.csv: figures of the tool `evo` (pip install evo==1.38.1) for the trajectories of the golden test.
 
     python golden.py $YFSLAM_DATA/trajectories > golden.csv
 

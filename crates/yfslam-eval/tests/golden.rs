@@ -1,4 +1,4 @@
-//! Every figure equals that of `evo` on published trajectories; `golden.csv` holds the figures and the commands that made them.
+//! Every figure equals that of `evo` on published trajectories; `golden.csv` has the figures and the commands that produced them.
 
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use yfslam_eval::{AlignmentKind, Delta, Match, RpeOptions, StampedPose, Statistics, align, associate, ate, rpe};
 
 const GOLDEN: &str = include_str!("golden.csv");
-/// m or degrees; the file has twelve digits. One differently matched pose of two thousand shows.
+/// Tolerance, m or degrees: the file has twelve digits, and one differently matched pose of two thousand exceeds it.
 const TOLERANCE: f64 = 1e-9;
 
 fn data() -> Option<PathBuf> {
@@ -30,7 +30,7 @@ fn read(path: &Path) -> Vec<StampedPose> {
     lines.map(pose).collect()
 }
 
-/// What a row of the file describes, computed here.
+/// Computes the statistics that a row of the file describes.
 fn compute(matches: &[Match], metric: &str, unit: &str, delta: &str, pairs: &str) -> Statistics {
     let delta = match unit {
         "" => None,

@@ -1,4 +1,4 @@
-//! What holds for any trajectory, and cases whose figures follow by hand.
+//! Properties that hold for any trajectory, and cases with figures that were computed by hand.
 
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
@@ -11,7 +11,7 @@ use yfslam_eval::{
 
 const FRAME_NS: i64 = 100_000_000;
 
-/// Poses at 10 Hz.
+/// Returns poses at 10 Hz.
 fn trajectory(poses: impl IntoIterator<Item = Isometry3<f64>>) -> Vec<StampedPose> {
     poses.into_iter().zip(0..).map(|(p, i)| StampedPose::new(i * FRAME_NS, p)).collect()
 }
@@ -20,7 +20,7 @@ fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
     Isometry3::translation(x, y, z)
 }
 
-/// A walk that is neither straight nor flat.
+/// Returns a path that is neither straight nor flat.
 fn curve(n: usize) -> Vec<StampedPose> {
     trajectory((0..n).map(|i| {
         let s = i as f64 / 10.0;
@@ -125,7 +125,7 @@ fn identical_trajectories_have_no_error() {
 }
 
 #[test]
-fn corners_of_a_square_lifted_in_turn_err_by_the_lift() {
+fn alternately_lifted_corners_of_a_square_have_the_lift_as_error() {
     let square = |lift: f64| trajectory([at(1., 1., lift), at(-1., 1., -lift), at(-1., -1., lift), at(1., -1., -lift)]);
     let ate = ate(&matched(&square(0.0), &square(0.25)), AlignmentKind::Se3).unwrap();
     assert!((ate.translation_m.min - 0.25).abs() < 1e-12 && (ate.translation_m.max - 0.25).abs() < 1e-12);
@@ -133,8 +133,8 @@ fn corners_of_a_square_lifted_in_turn_err_by_the_lift() {
 }
 
 #[test]
-fn constant_drift_shows_as_itself_over_frames_seconds_and_metres() {
-    // Each 0.1 s the camera moves 0.1 m ahead; the estimate adds 1 mm, and turns by 0.2 degrees about the direction of travel.
+fn constant_drift_is_measured_over_frames_seconds_and_metres() {
+    // Every 0.1 s the camera moves 0.1 m forward; the estimate adds 1 mm and turns by 0.2 degrees about the direction of travel.
     let straight = |step_m: f64, turn_deg: f64| {
         trajectory((0..31).map(|i| {
             let i = f64::from(i);
@@ -165,7 +165,7 @@ fn no_pair_in_seconds_spans_a_gap_in_tracking() {
     let all = curve(60);
     let estimate: Vec<_> = all.iter().copied().filter(|p| !(15..35).contains(&(p.timestamp_ns / FRAME_NS))).collect();
     let m = matched(&all, &estimate);
-    // 15 poses before the gap start 5 pairs, and 25 behind it start 15.
+    // The 15 poses before the gap start 5 pairs, and the 25 after it start 15.
     assert_eq!(rpe(&m, &RpeOptions::per_second()).unwrap().translation_m.count, 5 + 15);
     assert_eq!(
         rpe(&m, &RpeOptions { all_pairs: false, ..RpeOptions::per_second() }).unwrap().translation_m.count,
@@ -209,7 +209,7 @@ fn positions_on_a_line_or_at_a_point_have_no_alignment() {
 }
 
 #[test]
-fn a_span_that_does_not_occur_or_makes_no_sense_is_refused() {
+fn a_span_that_does_not_occur_or_is_out_of_range_is_refused() {
     let m = matched(&curve(20), &curve(20));
     for delta in [Delta::Frames(20), Delta::Seconds(5.0), Delta::Metres(100.0)] {
         for all_pairs in [false, true] {
@@ -223,7 +223,7 @@ fn a_span_that_does_not_occur_or_makes_no_sense_is_refused() {
 }
 
 #[test]
-fn an_evaluation_survives_json_and_prints_as_a_table() {
+fn an_evaluation_is_the_same_after_json_and_is_printed_as_a_table() {
     let reference = curve(40);
     let expected = ExpectedFrames::StampsNs(reference.iter().map(|p| p.timestamp_ns).collect());
     let options = EvalOptions { alignment: AlignmentKind::Sim3, expected, ..EvalOptions::default() };

@@ -1,6 +1,6 @@
-//! `boxes.json`: what is known about the things that can move in each frame of a recording.
+//! The detections file `boxes.json` of a recording: the bounding boxes of the objects that can move, for each frame.
 //!
-//! In, out: a list of frames with the boxes of their instances; `instance` is the grey value in `masks/`.
+//! `instance` is the grey value of the object in `masks/`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,14 +8,14 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use yfslam::{BoundingBox, Detection};
 
+use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::text::read_text;
-use crate::write::write_atomically;
 
-/// Name of the file in a sequence folder.
+/// Name of the detections file in a sequence folder.
 pub const BOXES_FILE: &str = "boxes.json";
 
-/// Boxes of a recording.
+/// The detections file of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoxList {
@@ -25,41 +25,41 @@ pub struct BoxList {
     pub frames: Vec<FrameBoxes>,
 }
 
-/// Boxes of one frame.
+/// The boxes of one frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameBoxes {
     /// Time of the colour image, ns.
     pub timestamp_ns: i64,
-    /// What is visible.
+    /// The visible objects.
     pub boxes: Vec<InstanceBox>,
 }
 
-/// One thing in one frame.
+/// One object in one frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceBox {
-    /// Which one; the same number in all frames and in the masks.
+    /// Number of the object, the same in all frames and in the masks.
     pub instance: u8,
-    /// What it is, one of [`BoxList::classes`].
+    /// Class of the object, one of [`BoxList::classes`].
     pub class: String,
     /// Left, top, right and bottom edge, px; pixel (x, y) is inside if left ≤ x < right and top ≤ y < bottom.
     pub bbox: [f32; 4],
 }
 
-/// Boxes as a perfect detector would report them, by the time of the frame in ns.
+/// The detections of a perfect detector by the time of the frame, ns.
 pub type KnownDetections = BTreeMap<i64, Vec<Detection>>;
 
 impl BoxList {
     /// Reads a `boxes.json`.
     ///
     /// # Errors
-    /// An unreadable file, one of another form, or a class that its list of classes lacks.
+    /// The file cannot be read, has another form, or uses a class that is missing in its list of classes.
     pub fn read(path: &Path) -> Result<Self> {
         let text = read_text(path)?;
-        let cure = "write it with `yfslam synth`, or remove it and give a detector";
+        let cure = "write it with `yfslam synth`, or remove it and use a detector";
         let list: Self = serde_json::from_str(&text)
-            .map_err(|error| Error::line(path, error.line(), format!("is no list of boxes: {error}"), cure))?;
+            .map_err(|error| Error::line(path, error.line(), format!("is not a detections file: {error}"), cure))?;
         let mut boxes = list.frames.iter().flat_map(|frame| &frame.boxes);
         match boxes.find(|b| !list.classes.contains(&b.class)) {
             Some(unknown) => Err(Error::content(path, format!("class '{}' is not in 'classes'", unknown.class), cure)),
@@ -67,7 +67,7 @@ impl BoxList {
         }
     }
 
-    /// Writes a `boxes.json`, one frame a line.
+    /// Writes a `boxes.json` with one frame per line.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -81,7 +81,7 @@ impl BoxList {
         })
     }
 
-    /// The boxes of the classes that are named, as detections of full score.
+    /// Returns the boxes of `classes` as detections with score 1.
     pub fn detections(&self, classes: &[String]) -> KnownDetections {
         let class = |name: &str| self.classes.iter().position(|known| known == name).unwrap_or(self.classes.len());
         let detection = |b: &InstanceBox| {
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn boxes_survive_the_way_to_the_disk_and_back() {
+    fn boxes_are_the_same_after_writing_and_reading() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(BOXES_FILE);
         let person = InstanceBox { instance: 2, class: "person".into(), bbox: [1.0, 2.5, 30.0, 40.0] };
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn another_form_is_refused_with_line_and_cure() {
+    fn a_file_of_another_form_is_refused_with_line_and_cure() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(BOXES_FILE);
         for (text, words) in [

@@ -1,7 +1,7 @@
-//! Depth values of a recording: their spread, and whether the depth factor can be right.
+//! Statistics of the depth values of a recording, and a check of the depth factor.
 //!
-//! A wrong factor is a common mistake, and nothing downstream notices it: the trajectory comes out whole, in
-//! the wrong scale, and every threshold in metres misses.
+//! A wrong factor is a common mistake that no later stage detects: the trajectory is complete but has the wrong scale, and every
+//! threshold in metres is wrong.
 
 use std::ops::RangeInclusive;
 
@@ -13,20 +13,22 @@ use crate::error::{Error, Result};
 use crate::sequence::Sequence;
 use crate::stream::{DEFAULT_LOOK_AHEAD, FrameStream};
 
-/// Medians of depth that a recording of rooms, desks or corridors can have, m.
+/// Plausible median depths of a recording of rooms, desks or corridors, m.
 pub const PLAUSIBLE_MEDIAN_M: RangeInclusive<f64> = 0.1..=20.0;
 
-/// Depth units per metre in use: millimetres, TUM and Bonn, 0.1 mm, centimetres, metres.
+/// Common depth units per metre: millimetres, TUM and Bonn, 0.1 mm, centimetres, metres.
 const COMMON_FACTORS: [f64; 5] = [1000.0, 5000.0, 10_000.0, 100.0, 1.0];
 
-/// Medians of depth worth suggesting a factor for, m.
+/// A factor is suggested if it gives a median depth in this range, m.
 const LIKELY_MEDIAN_M: RangeInclusive<f64> = 0.4..=8.0;
 
-/// Frames that [`check_recording`] looks at, and how many it tries to get them.
+/// Usable frames that [`check_recording`] needs.
 const PROBE_FRAMES: usize = 5;
+
+/// Frames that [`check_recording`] tries to decode for this.
 const PROBE_ATTEMPTS: usize = 30;
 
-/// Depth of several images, in metres; exact order statistics (nearest rank) over all measured pixels.
+/// Depth of several images, m: exact order statistics (nearest rank) over all measured pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthStatistics {
     /// Share of pixels with a measurement, 0 to 1.
@@ -40,7 +42,7 @@ pub struct DepthStatistics {
 }
 
 impl DepthStatistics {
-    /// Statistics of `images`, in sensor units of `depth_factor` a metre; `None` if no pixel has a measurement.
+    /// Computes the statistics of `images` with `depth_factor` units per metre; `None` if no pixel has a measurement.
     pub fn of<'a>(images: impl IntoIterator<Item = &'a Image<u16>>, depth_factor: f64) -> Option<Self> {
         let mut histogram = vec![0u64; 1 << 16];
         for &raw in images.into_iter().flat_map(|image| image.data()) {
@@ -65,16 +67,16 @@ impl DepthStatistics {
     }
 }
 
-/// Statistics of the first depth images of a recording, if `depth_factor` makes them plausible.
+/// Computes the statistics of the first depth images of a recording and refuses an implausible `depth_factor`.
 ///
 /// # Errors
-/// No image has a measurement, or the median lies outside [`PLAUSIBLE_MEDIAN_M`]; the message says which factors would fit.
+/// No image has a measurement, or the median is outside [`PLAUSIBLE_MEDIAN_M`]; the message suggests factors that would fit.
 pub fn check_depth_factor<'a>(
     images: impl IntoIterator<Item = &'a Image<u16>>,
     depth_factor: f64,
 ) -> Result<DepthStatistics> {
     let Some(statistics) = DepthStatistics::of(images, depth_factor) else {
-        return Err(Error::argument("the first depth images hold no measurement", "check the depth sensor"));
+        return Err(Error::argument("the first depth images contain no measurement", "check the depth sensor"));
     };
     if PLAUSIBLE_MEDIAN_M.contains(&statistics.median_m) {
         return Ok(statistics);
@@ -94,11 +96,11 @@ pub fn check_depth_factor<'a>(
     Err(Error::argument(problem, cure))
 }
 
-/// Decodes the first usable frames of `sequence` and checks `camera` against them: image size and, where there is depth, its factor.
-/// `None` without depth images.
+/// Decodes the first usable frames of `sequence` and checks the image size and, with depth images, the depth factor of `camera`.
+/// Returns `None` without depth images.
 ///
 /// # Errors
-/// None of the first frames can be used, for the reason that the message gives, or the depth factor is implausible.
+/// None of the first frames can be used, or the depth factor is implausible.
 pub fn check_recording(sequence: &Sequence, camera: &Camera) -> Result<Option<DepthStatistics>> {
     let first = sequence.entries.iter().take(PROBE_ATTEMPTS).cloned().collect();
     let first = Sequence { entries: first, ..sequence.clone() };
@@ -122,7 +124,7 @@ pub fn check_recording(sequence: &Sequence, camera: &Camera) -> Result<Option<De
     }
 }
 
-/// Two significant digits: 0.0014, 1.4, 71000.
+/// Formats a value with two significant digits: 0.0014, 1.4, 71000.
 fn significant(value: f64) -> String {
     let digits = if value > 0.0 { (1.0 - value.log10().floor()).clamp(0.0, 12.0) as usize } else { 1 };
     format!("{value:.digits$}")
@@ -152,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_factor_that_cannot_be_is_refused_with_those_that_can() {
+    fn an_implausible_factor_is_refused_and_plausible_ones_are_suggested() {
         let refusal = |raw: u16, factor: f64| check_depth_factor([&image(&[raw])], factor).unwrap_err().to_string();
         let error = refusal(1400, 50_000.0);
         assert_eq!(

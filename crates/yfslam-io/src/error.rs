@@ -1,4 +1,4 @@
-//! What can go wrong with files: every message names the file, the value and the cure.
+//! Errors of files and arguments: every message names the file, what is wrong with which value, and what to do.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,21 +12,21 @@ pub enum Error {
     /// The file or folder cannot be read.
     #[error("cannot read {}: {source}; {cure}", path.display())]
     Read {
-        /// What was to be read.
+        /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
-        /// What to do about it.
+        /// What to do.
         cure: String,
     },
-    /// The file cannot be written; what stood at `path` before still stands there.
+    /// The file cannot be written; an earlier file at `path` is unchanged.
     #[error("cannot write {}: {source}; {cure}", path.display())]
     Write {
-        /// What was to be written.
+        /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
-        /// What to do about it.
+        /// What to do.
         cure: String,
     },
     /// A line of a text file is malformed.
@@ -34,11 +34,11 @@ pub enum Error {
     Line {
         /// The text file.
         path: PathBuf,
-        /// Line number, counted from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong with it, with the value.
+        /// What is wrong, with the value.
         problem: String,
-        /// What to do about it.
+        /// What to do.
         cure: String,
     },
     /// The content as a whole is unusable.
@@ -46,17 +46,17 @@ pub enum Error {
     Content {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong with it, with the value.
+        /// What is wrong, with the value.
         problem: String,
-        /// What to do about it.
+        /// What to do.
         cure: String,
     },
     /// An option or argument is out of its range.
     #[error("{problem}; {cure}")]
     Argument {
-        /// What is wrong with it, with the value.
+        /// What is wrong, with the value.
         problem: String,
-        /// What to do about it.
+        /// What to do.
         cure: String,
     },
 }

@@ -1,7 +1,7 @@
-//! Faults that cameras and their drivers have, put into a stream of frames on purpose, to see what a system makes of them.
+//! Faults of cameras and their drivers, injected into a stream of frames to test a system with them.
 //!
 //! In: frames in the order of their stamps, and [`Fault`]s such as `black@2+0.5`. Out: [`Delivery`]s, as a faulty camera would send them.
-//! Everything follows from the frames alone: the same frames and faults give the same deliveries.
+//! The same frames and faults always give the same deliveries.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -14,58 +14,58 @@ use yfslam::image::{DepthImage, Image, RgbImage};
 use crate::error::{Error, Result};
 use crate::time::{format_stamp, parse_stamp_ns};
 
-/// What goes wrong.
+/// Kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// The frame never comes.
+    /// The frame is not delivered.
     Dropped,
-    /// The frame comes twice with one stamp.
+    /// The frame is delivered twice with the same stamp.
     Repeated,
     /// The colour image is white.
     Blank,
     /// The colour image is black.
     Black,
-    /// Colour and depth stay as they were when the fault began; stamps go on.
+    /// Colour and depth stay as they were when the fault began; stamps continue.
     Frozen,
-    /// Every other frame comes after its successor.
+    /// Every other frame is delivered after its successor.
     Late,
-    /// No pixel has a depth.
+    /// No pixel has depth.
     DepthDropout,
     /// The time stamp is not a number.
     NanStamp,
-    /// Something lies on the camera: a dark, noisy picture without depth.
+    /// The camera is covered: a dark, noisy image without depth.
     Covered,
 }
 
 impl FaultKind {
-    /// All kinds with their names and what they do.
+    /// All kinds with their names and descriptions.
     pub const ALL: [(&str, Self, &str); 9] = [
-        ("dropped", Self::Dropped, "frames never come"),
-        ("repeated", Self::Repeated, "frames come twice with one stamp"),
+        ("dropped", Self::Dropped, "frames are not delivered"),
+        ("repeated", Self::Repeated, "frames are delivered twice with the same stamp"),
         ("blank", Self::Blank, "white colour images"),
         ("black", Self::Black, "black colour images"),
-        ("frozen", Self::Frozen, "colour and depth stay, stamps go on"),
-        ("late", Self::Late, "every other frame comes after its successor"),
+        ("frozen", Self::Frozen, "colour and depth stay the same while stamps continue"),
+        ("late", Self::Late, "every other frame is delivered after its successor"),
         ("depth-dropout", Self::DepthDropout, "no depth in any pixel"),
         ("nan-stamp", Self::NanStamp, "time stamps that are not a number"),
         ("covered", Self::Covered, "dark, noisy colour and no depth"),
     ];
 }
 
-/// A fault and when it happens.
+/// A fault and its time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What goes wrong.
+    /// Kind.
     pub kind: FaultKind,
-    /// When it begins, ns after the first frame.
+    /// Begin, ns after the first frame.
     pub start_ns: i64,
-    /// How long it lasts, ns.
+    /// Duration, ns.
     pub duration_ns: i64,
 }
 
 impl Fault {
-    /// Whether a frame `elapsed_ns` after the first one is struck.
-    pub fn strikes(&self, elapsed_ns: i64) -> bool {
+    /// Returns whether the fault affects a frame `elapsed_ns` after the first one.
+    pub fn affects(&self, elapsed_ns: i64) -> bool {
         elapsed_ns >= self.start_ns && elapsed_ns < self.start_ns.saturating_add(self.duration_ns)
     }
 }
@@ -107,13 +107,13 @@ impl fmt::Display for Fault {
 /// A frame as the faulty camera sends it.
 #[derive(Clone, Debug)]
 pub struct Delivery {
-    /// The frame; its stamp is the true one even where the camera does not tell it.
+    /// The frame, always with its true stamp.
     pub frame: RgbdFrame,
-    /// Whether the camera tells the stamp.
+    /// Whether the camera delivers the stamp.
     pub has_stamp: bool,
 }
 
-/// Takes frames, gives deliveries.
+/// Turns frames into deliveries.
 #[derive(Debug)]
 pub struct FaultInjector {
     faults: Vec<Fault>,
@@ -124,17 +124,17 @@ pub struct FaultInjector {
 }
 
 impl FaultInjector {
-    /// Faults counted from `first_ns`, the stamp of the first frame.
+    /// Creates an injector; the times of the faults are relative to `first_ns`, the stamp of the first frame.
     pub fn new(faults: Vec<Fault>, first_ns: i64) -> Self {
         Self { faults, first_ns, frozen: None, held: None, ready: VecDeque::new() }
     }
 
-    /// Takes the next frame.
+    /// Adds the next frame.
     pub fn push(&mut self, mut frame: RgbdFrame) {
         let elapsed_ns = frame.timestamp_ns.saturating_sub(self.first_ns);
         let mut delivery = Some(true);
         let (mut twice, mut late, mut frozen) = (false, false, false);
-        for fault in self.faults.iter().filter(|fault| fault.strikes(elapsed_ns)) {
+        for fault in self.faults.iter().filter(|fault| fault.affects(elapsed_ns)) {
             match fault.kind {
                 FaultKind::Dropped => delivery = None,
                 FaultKind::NanStamp => delivery = delivery.map(|_| false),
@@ -145,13 +145,13 @@ impl FaultInjector {
                     let kept = self.frozen.get_or_insert_with(|| frame.clone());
                     frame = RgbdFrame { timestamp_ns: frame.timestamp_ns, ..kept.clone() };
                 }
-                FaultKind::Blank => show(&mut frame, |_| [255; 3]),
-                FaultKind::Black => show(&mut frame, |_| [0; 3]),
-                FaultKind::DepthDropout => hide_depth(&mut frame),
+                FaultKind::Blank => repaint(&mut frame, |_| [255; 3]),
+                FaultKind::Black => repaint(&mut frame, |_| [0; 3]),
+                FaultKind::DepthDropout => remove_depth(&mut frame),
                 FaultKind::Covered => {
                     let seed = frame.timestamp_ns as u64;
-                    show(&mut frame, |pixel| dark_noise(seed, pixel));
-                    hide_depth(&mut frame);
+                    repaint(&mut frame, |pixel| dark_noise(seed, pixel));
+                    remove_depth(&mut frame);
                 }
             }
         }
@@ -171,19 +171,19 @@ impl FaultInjector {
         self.finish();
     }
 
-    /// Lets go what is held back; to be called after the last frame.
+    /// Releases a frame that is held back; to be called after the last frame.
     pub fn finish(&mut self) {
         self.ready.extend(self.held.take());
     }
 
-    /// The next delivery, if one is ready.
+    /// Returns the next delivery, if one is ready.
     pub fn pop(&mut self) -> Option<Delivery> {
         self.ready.pop_front()
     }
 }
 
-/// Replaces the colour image, and the right picture, by one without anything that a detector could find.
-fn show(frame: &mut RgbdFrame, color: impl Fn(usize) -> [u8; 3]) {
+/// Replaces the colour image and the right image by `color` of each pixel, and removes all detections.
+fn repaint(frame: &mut RgbdFrame, color: impl Fn(usize) -> [u8; 3]) {
     let mut image = RgbImage::new(frame.color.width(), frame.color.height());
     image.data_mut().iter_mut().enumerate().for_each(|(pixel, rgb)| *rgb = color(pixel));
     frame.color = Arc::new(image);
@@ -191,12 +191,12 @@ fn show(frame: &mut RgbdFrame, color: impl Fn(usize) -> [u8; 3]) {
     frame.detections = frame.detections.as_ref().map(|_| Vec::new());
 }
 
-fn hide_depth(frame: &mut RgbdFrame) {
+fn remove_depth(frame: &mut RgbdFrame) {
     let (width, height) = (frame.depth.raw.width(), frame.depth.raw.height());
     frame.depth = Arc::new(DepthImage { raw: Image::new(width, height), metres_per_unit: frame.depth.metres_per_unit });
 }
 
-/// Grey levels from 4 to 19 without any structure (a draw of SplitMix64, Steele et al., OOPSLA 2014, for each pixel).
+/// Returns grey levels from 4 to 19 without structure: one draw of SplitMix64 (Steele et al., OOPSLA 2014) per pixel.
 fn dark_noise(seed: u64, pixel: usize) -> [u8; 3] {
     let mut bits = (seed ^ (pixel as u64) << 32).wrapping_add(0x9e37_79b9_7f4a_7c15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,15 +1,15 @@
-//! Sequences and formats, in and out.
+//! Reads recordings, cameras and trajectories, and writes the products of a run.
 //!
 //! ```text
 //! folder ──Sequence──► entries ──FrameStream──► RgbdFrame, or a FrameError for a frame that cannot be used
 //!   TUM, EuRoC, KITTI              decoded, stereo pairs rectified
 //! preset, settings file or TOML ──load_camera──► Camera
 //! frames ──FaultInjector──► frames as a faulty camera sends them ──RecordingWriter──► folder, with its BoxList
-//! trajectory file ◄──► TrajectoryFile        points, pictures, text ──write_atomically──► files
+//! trajectory file ◄──► TrajectoryFile        points, images, text ──write_atomically──► files
 //! ```
 //!
-//! An [`Error`] ends what was asked for: it names the file, the value and the cure. A [`FrameError`] concerns one frame; the
-//! caller counts it and goes on.
+//! An [`Error`] ends an operation: it names the file, what is wrong with which value, and what to do. A [`FrameError`] concerns one
+//! frame; the caller counts it and continues.
 //!
 //! ```no_run
 //! use yfslam_io::{FrameStream, Result, Sequence, SequenceOptions, check_recording, detect_camera, stream};
@@ -29,7 +29,7 @@
 //! }
 //! ```
 
-mod ascending;
+mod atomic_file;
 pub mod boxes;
 pub mod camera;
 pub mod decode;
@@ -41,9 +41,11 @@ pub mod sequence;
 pub mod stream;
 mod text;
 pub mod time;
+mod timestamp_order;
 pub mod trajectory;
 pub mod write;
 
+pub use atomic_file::write_atomically;
 pub use boxes::BoxList;
 pub use camera::{CameraSource, detect_camera, load_camera};
 pub use depth::{DepthStatistics, check_recording};
@@ -52,4 +54,9 @@ pub use faults::{Delivery, Fault, FaultInjector, FaultKind};
 pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};
 pub use trajectory::{StampedPose, TrajectoryFile, write_trajectory};
-pub use write::{RecordingWriter, write_atomically};
+pub use write::RecordingWriter;
+
+/// The example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,36 +1,36 @@
-//! Rectification of stereo pictures: after it, a point lies in the same row of both.
+//! Rectification of stereo images: afterwards a point lies in the same row of both.
 //!
-//! In: two calibrated cameras on one body. Out: the camera that both are then like, and for each a table of where its pixels are. Both
-//! are turned so that their x-axis is the baseline (Fusiello, Trucco and Verri, "A compact algorithm for rectification of stereo pairs",
-//! Machine Vision and Applications 2000), and get the shortest focal length at which no pixel looks beyond either picture.
+//! In: two calibrated cameras on one body. Out: their common rectified camera, and for each a table with the source of each pixel. Both
+//! are rotated so that their x-axis is the baseline (Fusiello, Trucco and Verri, "A compact algorithm for rectification of stereo pairs",
+//! Machine Vision and Applications 2000), and get the shortest focal length at which each pixel has a source in both images.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use yfslam::Camera;
 use yfslam::image::RgbImage;
 
-/// Points along each side of a picture that say what it shows.
+/// Points along each side of an image from which the common field of view is computed.
 const BORDER_POINTS: usize = 64;
 
 /// A camera fixed to a body.
 #[derive(Clone, Debug)]
 pub struct MountedCamera {
-    /// Its calibration.
+    /// Calibration.
     pub camera: Camera,
-    /// Its pose: body from camera.
+    /// Pose of the camera in the body frame.
     pub t_body_cam: Isometry3<f64>,
 }
 
-/// How the pictures of two cameras are rectified.
+/// Rectification of the images of two cameras.
 #[derive(Clone, Debug)]
 pub struct StereoRectification {
-    /// The left camera after it; `bf` is the baseline times `fx`.
+    /// The left camera after rectification; `bf` is the baseline times `fx`.
     pub camera: Camera,
     r_left_rectified: Rotation3<f64>,
     left: Remap,
     right: Remap,
 }
 
-/// Where the pixels of a picture are found in another.
+/// Table that holds, for each pixel of a rectified image, its place in the original image.
 #[derive(Clone, Debug)]
 pub struct Remap {
     width: usize,
@@ -38,7 +38,7 @@ pub struct Remap {
     taps: Vec<Tap>,
 }
 
-/// Four pixels, the first of them at `offset`, and the weights of the second column and row, in 1/256.
+/// Four neighbouring pixels, the first at `offset`, and the weights of the second column and row, in 1/256.
 #[derive(Clone, Copy, Debug)]
 struct Tap {
     offset: u32,
@@ -46,30 +46,32 @@ struct Tap {
 }
 
 impl StereoRectification {
+    /// Computes the rectification of a stereo pair.
+    ///
     /// # Errors
-    /// Says why the two are no stereo pair.
+    /// The two cameras do not form a stereo pair; the text says why.
     pub fn new(left: &MountedCamera, right: &MountedCamera) -> Result<Self, String> {
         let size = |m: &MountedCamera| (m.camera.width, m.camera.height);
         if size(left) != size(right) {
-            return Err(format!("the pictures have {:?} and {:?} px, not the same size", size(left), size(right)));
+            return Err(format!("the images have {:?} and {:?} px, not the same size", size(left), size(right)));
         }
         let t_left_right = left.t_body_cam.inverse() * right.t_body_cam;
         let baseline = t_left_right.translation.vector;
-        // Axes of the rectified cameras in the left one: x along the baseline, z as near to both optical axes as it may be.
+        // Axes of the rectified cameras in the left one: x along the baseline, z as close to both optical axes as possible.
         let x = baseline.normalize();
         let ahead = Vector3::z() + t_left_right.rotation * Vector3::z();
         let y = ahead.cross(&x).normalize();
         let z = x.cross(&y);
         if !(x.x > 0.5 && z.z > 0.5) {
             return Err(format!(
-                "the right camera is at {:.3} {:.3} {:.3} m of the left one, not to its right",
+                "the right camera is at ({:.3}, {:.3}, {:.3}) m in the frame of the left one, not to its right",
                 baseline.x, baseline.y, baseline.z
             ));
         }
         let r_left_rectified = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, z]));
         let r_right_rectified = t_left_right.rotation.to_rotation_matrix().inverse() * r_left_rectified;
         let mut camera = common_camera([(&left.camera, &r_left_rectified), (&right.camera, &r_right_rectified)])
-            .ok_or("the pictures do not overlap")?;
+            .ok_or("the images do not overlap")?;
         camera.bf = baseline.norm() * camera.fx;
         Ok(Self {
             left: Remap::new(&camera, &left.camera, &r_left_rectified),
@@ -79,25 +81,25 @@ impl StereoRectification {
         })
     }
 
-    /// Pose of the rectified left camera in the left camera.
+    /// Returns the pose of the rectified left camera in the left camera.
     pub fn t_left_rectified(&self) -> Isometry3<f64> {
         Isometry3::from_parts(Default::default(), UnitQuaternion::from_rotation_matrix(&self.r_left_rectified))
     }
 
-    /// For pictures of the left camera.
+    /// Returns the table for images of the left camera.
     pub fn left(&self) -> &Remap {
         &self.left
     }
 
-    /// For pictures of the right camera.
+    /// Returns the table for images of the right camera.
     pub fn right(&self) -> &Remap {
         &self.right
     }
 }
 
-/// The camera of the shortest focal length all of whose pixels both cameras see, each from a frame turned as given.
+/// Finds the camera with the shortest focal length whose whole image is within the view of both cameras, given their rotations.
 fn common_camera(turned: [(&Camera, &Rotation3<f64>); 2]) -> Option<Camera> {
-    // What both see for sure: within the innermost points of each side.
+    // The common field of view ends at the innermost points of each side.
     let (mut low, mut high) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
     for (camera, r_cam_rectified) in turned {
         let (right, bottom) = ((camera.width - 1) as f64, (camera.height - 1) as f64);
@@ -130,14 +132,14 @@ fn common_camera(turned: [(&Camera, &Rotation3<f64>); 2]) -> Option<Camera> {
 }
 
 impl Remap {
-    /// From pixels of `to` to those of `from`, both of one size, whose frame has `to`'s axes turned by `r_from_to`.
+    /// Computes the table from pixels of `to` to pixels of `from`; both have the same size, and `r_from_to` rotates between their frames.
     fn new(to: &Camera, from: &Camera, r_from_to: &Rotation3<f64>) -> Self {
         let (width, height) = (to.width, to.height);
         let tap = |i: usize| {
             let [x, y] = to.undistort((i % width) as f64, (i / width) as f64);
             let ray = r_from_to * Vector3::new(x, y, 1.0);
             let [u, v] = from.distort(ray.x / ray.z, ray.y / ray.z);
-            // The last column and row have no neighbours; rounding may lead a hair beyond the first.
+            // The last column and row have no neighbours; rounding may lead slightly beyond the first.
             let (u, v) = (u.clamp(0.0, (width - 1) as f64), v.clamp(0.0, (height - 1) as f64));
             let (left, top) = ((u as usize).min(width.saturating_sub(2)), (v as usize).min(height.saturating_sub(2)));
             let weight = |position: f64, first: usize| (256.0 * (position - first as f64) + 0.5) as u16;
@@ -146,10 +148,10 @@ impl Remap {
         Self { width, height, taps: (0..width * height).map(tap).collect() }
     }
 
-    /// The picture as the rectified camera would see it; `picture` has the size of the table, else nothing is seen.
-    pub fn apply(&self, picture: &RgbImage) -> RgbImage {
+    /// Returns the rectified image; it is black if `image` does not have the size of the table.
+    pub fn apply(&self, image: &RgbImage) -> RgbImage {
         let mut out = RgbImage::new(self.width, self.height);
-        let data = picture.data();
+        let data = image.data();
         for (pixel, tap) in out.data_mut().iter_mut().zip(&self.taps) {
             let (first, second) = (tap.offset as usize, tap.offset as usize + self.width);
             let (Some([a, b]), Some([c, d])) = (pair(data, first), pair(data, second)) else { continue };
@@ -163,16 +165,16 @@ impl Remap {
     }
 }
 
-/// Two neighbours.
+/// Returns two neighbouring pixels.
 fn pair(data: &[[u8; 3]], first: usize) -> Option<&[[u8; 3]; 2]> {
-    data.get(first..first + 2)?.as_array()
+    data.get(first..)?.first_chunk()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Two cameras like those of EuRoC, a little turned against each other.
+    /// Returns two cameras like those of EuRoC, slightly rotated against each other.
     fn cameras() -> [MountedCamera; 2] {
         let camera = |fx: f64, cx: f64| Camera {
             width: 376,
@@ -193,15 +195,15 @@ mod tests {
             .map(|(fx, cx, pose)| MountedCamera { camera: camera(fx, cx), t_body_cam: body * pose })
     }
 
-    /// Where a picture whose red is the column and whose green is the row was looked at.
-    fn looked_at(remap: &Remap, u: usize, v: usize) -> [f64; 2] {
+    /// Returns the column and row in the original image that a pixel of the rectified image is taken from.
+    fn source_of(remap: &Remap, u: usize, v: usize) -> [f64; 2] {
         let tap = remap.taps[v * remap.width + u];
         let at = |first: usize, weight: u16| first as f64 + f64::from(weight) / 256.0;
         [at(tap.offset as usize % remap.width, tap.weights[0]), at(tap.offset as usize / remap.width, tap.weights[1])]
     }
 
     #[test]
-    fn a_point_lies_in_one_row_of_both_pictures_as_far_apart_as_baseline_and_depth_say() {
+    fn a_point_lies_in_the_same_row_of_both_images_at_the_disparity_of_its_depth() {
         let [left, right] = cameras();
         let r = StereoRectification::new(&left, &right).unwrap();
         let t_body_rectified = left.t_body_cam * r.t_left_rectified();
@@ -214,11 +216,11 @@ mod tests {
                 camera.camera.distort(p.x / p.z, p.y / p.z)
             };
             let error = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
-            assert!(error(looked_at(&r.left, u, v), seen(&left)) < 0.01);
+            assert!(error(source_of(&r.left, u, v), seen(&left)) < 0.01);
             let there = u as f64 - r.camera.bf / z;
             if there >= 0.0 {
                 // Between two pixels of the table.
-                let (a, b) = (looked_at(&r.right, there as usize, v), looked_at(&r.right, there as usize + 1, v));
+                let (a, b) = (source_of(&r.right, there as usize, v), source_of(&r.right, there as usize + 1, v));
                 let at = [0, 1].map(|k| a[k] + (b[k] - a[k]) * there.fract());
                 assert!(error(at, seen(&right)) < 0.02, "{at:?} {:?}", seen(&right));
             }
@@ -226,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn no_pixel_looks_beyond_either_picture() {
+    fn every_pixel_has_its_source_within_both_images() {
         let [left, right] = cameras();
         let r = StereoRectification::new(&left, &right).unwrap();
         for (remap, from, turn) in [
@@ -248,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_that_is_none_is_refused() {
+    fn cameras_that_form_no_stereo_pair_are_refused() {
         let [left, right] = cameras();
         let error = StereoRectification::new(&right, &left).unwrap_err();
         assert!(error.contains("not to its right"), "{error}");

@@ -1,4 +1,4 @@
-//! Text files as numbered lines of content: comments, blank lines, byte-order mark and CRLF are gone.
+//! Reads text files as numbered lines without comments, blank lines, byte-order mark and CRLF.
 
 use std::fs::{self, File};
 use std::io::Read;
@@ -6,10 +6,10 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// Largest file read whole, bytes. A day of poses at 30 Hz or a 60-megapixel PNG fit; a device that never ends does not.
+/// Largest file that is read, bytes: enough for a day of poses at 30 Hz or a 60-megapixel PNG, and a bound for endless devices.
 pub const MAX_FILE_BYTES: u64 = 400 << 20;
 
-/// Reads a whole regular file into `bytes`, whose old content is dropped.
+/// Reads a whole regular file into `bytes` and drops their old content.
 pub fn read_bytes(path: &Path, bytes: &mut Vec<u8>) -> std::io::Result<()> {
     bytes.clear();
     let metadata = fs::metadata(path)?;
@@ -33,7 +33,7 @@ pub fn read_text(path: &Path) -> Result<String> {
     })
 }
 
-/// Lines that hold something, trimmed, with their numbers from 1. Lines that start with `#` are comments.
+/// Returns the non-empty lines, trimmed, with their numbers from 1. Lines that start with `#` are comments.
 pub fn content_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let numbered = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));

@@ -1,4 +1,4 @@
-//! Time stamps: decimal seconds as text, integer nanoseconds inside; no floating point in between.
+//! Time stamps: converts between decimal seconds as text and integer nanoseconds, without floating point.
 
 /// Why a text is not a time stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -6,12 +6,12 @@ pub enum StampError {
     /// The text is not a decimal number.
     #[error("is not a number of seconds")]
     NotANumber,
-    /// The number does not fit 64-bit nanoseconds, that is ±292 years.
+    /// The number exceeds 64-bit nanoseconds, ±292 years.
     #[error("is beyond 292 years; stamps are expected in seconds, not in milli-, micro- or nanoseconds")]
     OutOfRange,
 }
 
-/// Digits kept of a mantissa: all that a printed double holds, and 10 times their value still fits `u128`.
+/// Bound of a mantissa: it has all digits of a printed double, and 10 times its value fits `u128`.
 const MANTISSA_LIMIT: u128 = 10u128.pow(36);
 
 /// Parses decimal seconds (`1305031102.175304`, also `1.305031102175304e+09`) into nanoseconds, exactly.
@@ -37,7 +37,7 @@ pub fn parse_stamp_ns(text: &str) -> Result<i64, StampError> {
     Ok(if negative { -magnitude } else { magnitude })
 }
 
-/// Value as mantissa · 10^scale.
+/// Parses digits with an optional point into mantissa · 10^scale.
 fn parse_digits(digits: &[u8]) -> Result<(u128, i64), StampError> {
     let (mut mantissa, mut scale) = (0u128, 0i64);
     let (mut seen_point, mut seen_digit) = (false, false);
@@ -58,7 +58,7 @@ fn parse_digits(digits: &[u8]) -> Result<(u128, i64), StampError> {
     if seen_digit { Ok((mantissa, scale)) } else { Err(StampError::NotANumber) }
 }
 
-/// The exponent of a number such as `1e+09`, held within ±10⁶, which is far beyond any stamp.
+/// Parses the exponent of a number such as `1e+09`, limited to ±10⁶, which is far beyond any stamp.
 fn parse_exponent(text: &[u8]) -> Result<i64, StampError> {
     let (sign, digits) = match text {
         [b'-', rest @ ..] => (-1, rest),
@@ -84,31 +84,31 @@ fn scale_by_power_of_ten(value: u128, power: i64) -> Option<u128> {
     }
 }
 
-/// Nanoseconds as decimal seconds with nine decimals, exactly; the inverse of [`parse_stamp_ns`].
+/// Formats nanoseconds as decimal seconds with nine decimals, exactly; the inverse of [`parse_stamp_ns`].
 pub fn format_stamp(stamp_ns: i64) -> String {
     let sign = if stamp_ns < 0 { "-" } else { "" };
     let magnitude = stamp_ns.unsigned_abs();
     format!("{sign}{}.{:09}", magnitude / 1_000_000_000, magnitude % 1_000_000_000)
 }
 
-/// Nanoseconds as seconds, for display and statistics.
+/// Converts nanoseconds to seconds, for display and statistics.
 pub fn seconds(duration_ns: i64) -> f64 {
     duration_ns as f64 * 1e-9
 }
 
 /// Maps time so that a part played backward runs forward: t' = first + last − t.
 ///
-/// Ground truth goes through the same mirror before a reversed run is evaluated.
+/// The ground truth is mirrored in the same way before a reversed run is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimeMirror {
-    /// First colour stamp of the part, ns.
+    /// Stamp of the first colour image of the part, ns.
     pub first_ns: i64,
-    /// Last colour stamp of the part, ns.
+    /// Stamp of the last colour image of the part, ns.
     pub last_ns: i64,
 }
 
 impl TimeMirror {
-    /// The mirrored stamp, ns; saturates at the ends of the range.
+    /// Returns the mirrored stamp, ns; saturates at the ends of the range.
     pub fn apply(self, stamp_ns: i64) -> i64 {
         let mirrored = i128::from(self.first_ns) + i128::from(self.last_ns) - i128::from(stamp_ns);
         mirrored.clamp(i64::MIN.into(), i64::MAX.into()) as i64
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_that_are_no_stamps_are_refused() {
+    fn malformed_stamps_are_refused() {
         for text in ["", ".", "-", "nan", "inf", "1.2.3", "1,5", "0x10", "1e", "1e+", "e5", "12a", "１"] {
             assert_eq!(parse_stamp_ns(text), Err(StampError::NotANumber), "{text:?}");
         }

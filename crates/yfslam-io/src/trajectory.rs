@@ -1,39 +1,39 @@
-//! Trajectories in the TUM format: `timestamp tx ty tz qx qy qz qw`, one pose a line, world from camera.
+//! Trajectories in the TUM format: `timestamp tx ty tz qx qy qz qw`, one pose per line, world from camera.
 
 use std::io;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-use crate::ascending::keep_ascending;
+use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::text::{content_lines, read_text};
 use crate::time::{TimeMirror, format_stamp, parse_stamp_ns};
-use crate::write::write_atomically;
+use crate::timestamp_order::keep_ascending;
 
-/// Largest deviation of a quaternion's length from 1. Files with two decimals stay below; columns in another order rarely do.
+/// Largest deviation of the length of a quaternion from 1. Files with two decimals stay below it; columns in another order rarely do.
 const MAX_NORM_ERROR: f64 = 0.05;
 
-/// Names of the columns behind the stamp.
+/// Names of the columns after the stamp.
 const COLUMNS: [&str; 7] = ["tx", "ty", "tz", "qx", "qy", "qz", "qw"];
 
-const FORMAT_CURE: &str = "write 'timestamp tx ty tz qx qy qz qw' with blanks between";
+const FORMAT_CURE: &str = "write 'timestamp tx ty tz qx qy qz qw' with blanks between the values";
 
-/// Where the camera was at a time.
+/// Pose of the camera at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StampedPose {
     /// Time, ns.
     pub timestamp_ns: i64,
-    /// World from camera, m: maps points of the camera (x right, y down, z forward) into the world.
+    /// World from camera, m: maps points from the camera frame (x right, y down, z forward) into the world frame.
     pub pose: Isometry3<f64>,
 }
 
-/// A trajectory as read from a file.
+/// A trajectory read from a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrajectoryFile {
     /// The poses; stamps ascend strictly.
     pub poses: Vec<StampedPose>,
-    /// Lines skipped because their stamp had been there already.
+    /// Lines skipped because their stamp occurred before.
     pub duplicates_skipped: usize,
     /// Lines skipped because their stamps run backward.
     pub backward_skipped: usize,
@@ -43,13 +43,13 @@ impl TrajectoryFile {
     /// Reads a trajectory file.
     ///
     /// # Errors
-    /// An unreadable or empty file, or a line with the wrong number of columns, a value that is not finite, or a quaternion that is
+    /// The file is unreadable or empty, or a line has the wrong number of columns, a value that is not finite, or a quaternion that is
     /// not of unit length.
     pub fn read(path: &Path) -> Result<Self> {
         Self::parse(&read_text(path)?, path)
     }
 
-    /// Parses the text of a trajectory file; `path` is for messages.
+    /// Parses the text of a trajectory file; `path` names it in error messages.
     ///
     /// # Errors
     /// As [`TrajectoryFile::read`].
@@ -59,17 +59,17 @@ impl TrajectoryFile {
         Self::from_poses(poses, path)
     }
 
-    /// Poses read from `path` in some format, those kept whose stamps ascend.
+    /// Keeps the poses whose stamps ascend; `path` names the file in error messages.
     pub(crate) fn from_poses(poses: Vec<StampedPose>, path: &Path) -> Result<Self> {
         if poses.is_empty() {
-            return Err(Error::content(path, "holds no pose", FORMAT_CURE));
+            return Err(Error::content(path, "contains no pose", FORMAT_CURE));
         }
         let kept = keep_ascending(poses, |pose: &StampedPose| pose.timestamp_ns, path)?;
         Ok(Self { poses: kept.items, duplicates_skipped: kept.duplicates, backward_skipped: kept.backward })
     }
 }
 
-/// Ground truth for a sequence that is played backward: stamps mirrored, order turned round, poses as they are.
+/// Returns the ground truth of a sequence that is played backward: the stamps are mirrored and the order is reversed.
 pub fn mirror_trajectory(poses: &[StampedPose], mirror: TimeMirror) -> Vec<StampedPose> {
     let mirrored = |pose: &StampedPose| StampedPose { timestamp_ns: mirror.apply(pose.timestamp_ns), ..*pose };
     poses.iter().rev().map(mirrored).collect()
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_no_pose_are_refused_with_line_and_value() {
+    fn malformed_poses_are_refused_with_line_and_value() {
         for (line, expected) in [
             ("1 nan 0 0 0 0 0 1", "tx is 'nan'"),
             ("1 0 0 inf 0 0 0 1", "tz is 'inf'"),
@@ -170,7 +170,7 @@ mod tests {
             let error = refusal(&format!("{GOOD}{line}\n"));
             assert!(error.starts_with("groundtruth.txt:5: ") && error.contains(expected), "{error}");
         }
-        assert!(refusal("# nothing\n").contains("holds no pose"));
+        assert!(refusal("# nothing\n").contains("contains no pose"));
         assert!(TrajectoryFile::read(Path::new("/nowhere/x.txt")).unwrap_err().to_string().contains("/nowhere/x.txt"));
     }
 

@@ -1,4 +1,4 @@
-//! Files that others wrote: the cameras and trajectories that come with the development data.
+//! Files of other programs: the cameras and trajectories of the development data.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
 mod common;
@@ -19,7 +19,7 @@ fn the_settings_files_of_the_recordings_equal_the_presets() {
 }
 
 #[test]
-fn published_trajectories_are_read_whole() {
+fn published_trajectories_are_read_completely() {
     for (name, poses, duplicates) in
         [("fr2_desk_groundtruth", 20_956, 1), ("fr2_desk_ORB", 2_893, 0), ("fr3_sitting_xyz_groundtruth", 4_251, 0)]
     {

@@ -1,4 +1,4 @@
-//! What the reader of sequences promises: order, parts, playing backward, and a clear refusal of folders that are none.
+//! The reader of sequences: order, parts, playing backward, and clear errors for other folders.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
 mod common;
@@ -13,7 +13,7 @@ use yfslam_io::sequence::lists::ListedFile;
 use yfslam_io::{Sequence, SequenceOptions};
 
 fn depth(entry: &FrameEntry) -> &ListedFile {
-    entry.companion.as_ref().unwrap()
+    entry.paired_image.as_ref().unwrap()
 }
 
 fn refusal(folder: &Path) -> String {
@@ -38,7 +38,7 @@ fn a_tum_folder_is_paired_by_time() {
 }
 
 #[test]
-fn unmatched_duplicate_and_backward_images_are_counted_and_left_out() {
+fn unmatched_duplicate_and_backward_images_are_counted_and_skipped() {
     let folder = tempfile::tempdir().unwrap();
     write_sequence(folder.path(), 6);
     let path = folder.path();
@@ -49,13 +49,13 @@ fn unmatched_duplicate_and_backward_images_are_counted_and_left_out() {
     .unwrap();
     fs::write(path.join("depth.txt"), "100.005 depth/0.png\n100.205 depth/2.png\n100.3 depth/3.png\n").unwrap();
     let report = Sequence::open(path, &SequenceOptions::default()).unwrap().report;
-    assert_eq!((report.color_listed, report.companions_listed, report.paired), (5, 3, 2));
+    assert_eq!((report.color_listed, report.paired_images_listed, report.paired), (5, 3, 2));
     assert_eq!((report.duplicates_skipped, report.backward_skipped), (1, 1));
-    assert_eq!((report.color_unmatched, report.companions_unmatched), (1, 1));
+    assert_eq!((report.color_unmatched, report.paired_images_unmatched), (1, 1));
 }
 
 #[test]
-fn an_associations_file_is_taken_at_its_word_in_either_order_of_columns() {
+fn the_pairs_of_an_associations_file_are_used_in_either_order_of_columns() {
     let folder = tempfile::tempdir().unwrap();
     write_sequence(folder.path(), 3);
     for text in [
@@ -94,14 +94,14 @@ fn a_part_is_cut_out_and_played_backward_with_ascending_stamps() {
         let error = Sequence::open(folder.path(), &SequenceOptions { start, end, ..Default::default() })
             .unwrap_err()
             .to_string();
-        assert!(error.contains(&format!("frames {start} to")) && error.contains("10 frames"), "{error}");
+        assert!(error.contains(&format!("from frame {start} to")) && error.contains("10 frames"), "{error}");
     }
     let whole = SequenceOptions { end: Some(1000), ..Default::default() };
     assert_eq!(Sequence::open(folder.path(), &whole).unwrap().entries.len(), 10);
 }
 
 #[test]
-fn folders_that_are_no_sequence_are_refused_with_a_cure() {
+fn folders_without_a_sequence_are_refused_with_a_cure() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     assert!(refusal(&path.join("nowhere")).contains("nowhere: "));
@@ -130,7 +130,7 @@ fn empty_malformed_unsorted_and_binary_lists_are_refused() {
     };
     assert!(refusal_of(b"# nothing\n").contains("rgb.txt: lists no image"));
     assert!(refusal_of(b"100.0 rgb/0.png\n100.1\n").contains("rgb.txt:2"));
-    assert!(refusal_of(b"nan rgb/0.png\n").contains("lists no image that has a time stamp"));
+    assert!(refusal_of(b"nan rgb/0.png\n").contains("lists no image with a time stamp"));
     assert!(refusal_of(b"5 a\n4 a\n3 a\n2 a\n").contains("3 of its 4 stamps run backward; sort"));
     assert!(refusal_of(b"\xff\xfe1\x00").contains("not UTF-8"));
     fs::write(folder.path().join("associations.txt"), "\n").unwrap();
@@ -176,7 +176,7 @@ fn association_of_the_development_recordings_equals_their_published_pairs() {
     }
 }
 
-/// A list of one or two images a line, now and then with a line of anything.
+/// Generates a list with one or two images per line, and some lines of arbitrary text.
 fn list_text(images_a_line: usize) -> impl Strategy<Value = String> {
     let stamp = "[0-9]{1,2}|-?[0-9]{8,9}\\.[0-9]{1,9}";
     let image = (stamp, "(rgb/0|depth/0|rgb/1|x)\\.png").prop_map(|(stamp, file)| format!("{stamp} {file}"));
@@ -188,7 +188,7 @@ fn list_text(images_a_line: usize) -> impl Strategy<Value = String> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(200) })]
     #[test]
-    fn a_folder_of_arbitrary_lists_never_panics_and_every_image_is_accounted_for(
+    fn a_folder_of_arbitrary_lists_never_panics_and_every_image_is_counted(
         (rgb, depth, associations) in (list_text(1), list_text(1), list_text(2)),
         with_associations: bool,
         reverse: bool,
@@ -207,12 +207,12 @@ proptest! {
             let report = &sequence.report;
             prop_assert_eq!(report.paired, sequence.entries.len());
             let skipped = report.duplicates_skipped + report.backward_skipped;
-            let unmatched = report.color_unmatched + report.companions_unmatched;
+            let unmatched = report.color_unmatched + report.paired_images_unmatched;
             let accounted = match report.from_associations_file {
                 true => 2 * (report.paired + skipped),
                 false => 2 * report.paired + skipped + unmatched,
             };
-            prop_assert_eq!(report.color_listed + report.companions_listed, accounted);
+            prop_assert_eq!(report.color_listed + report.paired_images_listed, accounted);
             let _ = sequence.info();
         }
     }

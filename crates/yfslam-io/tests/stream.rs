@@ -1,4 +1,4 @@
-//! What the stream of frames promises: order, errors as values, on generated and on real recordings.
+//! The stream of frames: order and errors as values, on generated and on real recordings.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
 mod common;
@@ -17,7 +17,7 @@ fn stream(folder: &Path) -> FrameStream {
 }
 
 #[test]
-fn frames_come_in_order_with_their_own_images() {
+fn frames_arrive_in_order_with_their_own_images() {
     let folder = tempfile::tempdir().unwrap();
     write_sequence(folder.path(), 50);
     for look_ahead in [0, 1, 4, 100] {
@@ -86,7 +86,7 @@ fn the_development_recordings_decode_without_an_error() {
         println!(
             "{name}: {count} frames, ms a frame: colour {:.2}, depth {:.2}, waited {:.2}",
             ms(times.color),
-            ms(times.companion),
+            ms(times.paired_image),
             ms(times.waited)
         );
     }

@@ -1,4 +1,4 @@
-//! Rendering: frames of every scene at 640 × 480 once its surfaces are made, and the time until the first frame is there.
+//! Times of rendering: frames of every scene at 640 × 480 once their surfaces are computed, and the time until the first frame.
 #![allow(clippy::expect_used, reason = "a benchmark fails as tests do")]
 
 use criterion::{Criterion, criterion_group, criterion_main};

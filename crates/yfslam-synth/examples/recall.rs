@@ -1,7 +1,8 @@
-//! How well the official detector finds the synthetic people: a table, and the pictures with its boxes.
+//! Measures how many synthetic people the official detector finds: a table, and images with its boxes.
 //!
 //! `YFSLAM_DATA=... cargo run --release -p yfslam-synth --example recall -- out 30 walking_xyz?seed=1 sitting_rpy?seed=2` takes
-//! every 30th frame; the folder `-` writes no pictures. Green is a person who is found, red one who is missed, blue a detection.
+//! every 30th frame; with the folder `-` no images are written. Green: a person who is found; red: one who is missed; blue: a
+//! detection.
 
 use std::error::Error;
 use std::path::Path;
@@ -40,16 +41,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             if folder == "-" || seen.is_empty() {
                 return;
             }
-            let mut picture = shot.frame.color.as_ref().clone();
+            let mut rendering = shot.frame.color.as_ref().clone();
             for d in detections.iter().filter(|d| d.class == 0) {
-                outline(&mut picture, &d.bbox, [40, 80, 255]);
+                outline(&mut rendering, &d.bbox, [40, 80, 255]);
             }
             for s in seen {
-                outline(&mut picture, &s.bbox, if s.found { [0, 230, 0] } else { [255, 0, 0] });
+                outline(&mut rendering, &s.bbox, if s.found { [0, 230, 0] } else { [255, 0, 0] });
             }
             let miss = if seen.iter().any(|s| !s.found) { "miss" } else { "all" };
             let file = format!("{miss}_{}_{index:04}.png", spec.replace(['?', '&', '=', ':'], "-"));
-            failure = write_color_png(&Path::new(folder).join(file), &picture).err().or(failure.take());
+            failure = write_color_png(&Path::new(folder).join(file), &rendering).err().or(failure.take());
         });
         if let Some(error) = failure {
             return Err(error.into());

@@ -1,4 +1,4 @@
-//! Renders frames of a synthetic world into PNG files, in colour and in depth, and tells how long it took.
+//! Renders frames of a synthetic world into PNG files, in colour and in depth, and prints the time for it.
 //!
 //! `cargo run --release -p yfslam-synth --example render -- 'synth:walking_xyz?seed=7' out 0 30 60` writes `out/color_0000.png`,
 //! `out/depth_0000.png` and so on. Without frame numbers it only measures.
@@ -13,7 +13,7 @@ use yfslam_synth::{SynthFrame, World, parse};
 
 /// Frames rendered for the mean rate, spread over the sequence.
 const MEASURED: usize = 20;
-/// Depth that is shown white, m.
+/// Depth that is drawn white, m.
 const WHITE_M: f32 = 5.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -33,10 +33,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let index: usize = index.parse()?;
         let shot = world.frame(index);
         write_color_png(&Path::new(folder).join(format!("color_{index:04}.png")), &shot.frame.color)?;
-        write_color_png(&Path::new(folder).join(format!("depth_{index:04}.png")), &depth_picture(&shot)?)?;
+        write_color_png(&Path::new(folder).join(format!("depth_{index:04}.png")), &depth_image(&shot)?)?;
         eprintln!("frame {index}: boxes {:?}", shot.boxes);
     }
-    // Once unmeasured: textures are painted when they are first seen.
+    // The first rendering is not measured: textures are painted when they are first visible.
     let spread = || (0..MEASURED).map(|k| k * world.len() / MEASURED);
     spread().for_each(|index| drop(world.frame(index)));
     let started = Instant::now();
@@ -46,8 +46,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Measured depth as grey, actors tinted.
-fn depth_picture(shot: &SynthFrame) -> Result<Image<[u8; 3]>, Box<dyn Error>> {
+/// Returns the measured depth as grey, with tinted actors.
+fn depth_image(shot: &SynthFrame) -> Result<Image<[u8; 3]>, Box<dyn Error>> {
     let depth = &shot.frame.depth;
     let pixels = depth.raw.data().iter().zip(shot.instances.data()).map(|(&raw, &instance)| {
         let grey = (f32::from(raw) * depth.metres_per_unit / WHITE_M * 255.0).min(255.0) as u8;

@@ -1,4 +1,4 @@
-//! Light maps: irradiance of what stands still, with shadows.
+//! Light maps: irradiance of static surfaces, with shadows.
 //!
 //! In: the static mesh and the lamps. Out: a [`LightMap`] per patch, computed with shadow rays at points about
 //! [`SPACING_M`] apart.
@@ -7,7 +7,7 @@ use crate::bvh::Bvh;
 use crate::light::Lights;
 use crate::mesh::{Mesh, Triangle, Vec3};
 
-/// Irradiance over a patch's [0, 1]².
+/// Irradiance over the [0, 1]² of a patch.
 #[derive(Clone, Debug)]
 pub struct LightMap {
     width: usize,
@@ -19,7 +19,7 @@ pub struct LightMap {
 /// Distance between light-map samples on large surfaces, m.
 const SPACING_M: f32 = 0.11;
 
-/// Makes light maps, one patch at a time.
+/// Computes light maps, one patch at a time.
 #[derive(Clone, Debug)]
 pub struct Baker {
     lights: Lights,
@@ -30,14 +30,14 @@ pub struct Baker {
 }
 
 impl Baker {
-    /// A baker for `mesh` that casts `samples` rays per lamp and point, see [`Lights::irradiance`].
+    /// Creates a baker for `mesh` that casts `samples` rays per lamp and point, see [`Lights::irradiance`].
     pub fn new(mesh: &Mesh, lights: Lights, samples: usize) -> Self {
-        // Without rays there is nothing to search in.
+        // Without rays no hierarchy is needed.
         let bvh = if samples > 0 { Bvh::new(mesh) } else { Bvh::new(&Mesh::default()) };
         Self { lights, bvh, first: first_triangles(mesh), samples }
     }
 
-    /// The light map of patch number `patch` of the mesh.
+    /// Computes the light map of patch number `patch` of the mesh.
     pub fn bake(&self, mesh: &Mesh, patch: usize) -> LightMap {
         let triangles = &mesh.triangles[self.first[patch]..self.first[patch + 1]];
         let [w, h] = extent(mesh, triangles);
@@ -46,8 +46,8 @@ impl Baker {
         let hidden = |o: &Vec3, d: &Vec3, far: f32| self.bvh.hit(o, d, far);
         let values = (0..width * height)
             .map(|i| {
-                // Samples sit on the border too, as bilinear interpolation wants them, but a little inside, so that
-                // they do not start within a wall that the patch touches.
+                // Samples lie also on the border, which bilinear interpolation needs, but slightly inside, so that they do not
+                // start within a wall that the patch touches.
                 let inset = |k: usize, n: usize| (k as f32 / (n - 1) as f32).clamp(0.02, 0.98);
                 let uv = [inset(i % width, width), inset(i / width, height)];
                 match locate(mesh, triangles, uv) {
@@ -61,7 +61,7 @@ impl Baker {
 }
 
 impl LightMap {
-    /// Irradiance at (u, v) and the share of it that flickers, bilinear.
+    /// Returns the irradiance at (u, v) and the share of it that flickers, bilinear.
     #[inline]
     pub fn sample(&self, u: f32, v: f32) -> [f32; 4] {
         let x = (u * (self.width - 1) as f32).clamp(0.0, (self.width - 1) as f32);
@@ -75,13 +75,13 @@ impl LightMap {
     }
 }
 
-/// Index of the first triangle of each patch, and the total at the end; patches are contiguous by construction.
+/// Returns the index of the first triangle of each patch, and the total at the end; patches are contiguous by construction.
 fn first_triangles(mesh: &Mesh) -> Vec<usize> {
     (0..=mesh.patches.len() as u32).map(|patch| mesh.triangles.partition_point(|t| t.patch < patch)).collect()
 }
 
 fn extent(mesh: &Mesh, triangles: &[Triangle]) -> [f32; 2] {
-    // Greatest length per unit of u and v over the triangles' edges.
+    // The greatest length per unit of u and v over the edges of the triangles.
     let mut size = [0.0f32; 2];
     for triangle in triangles {
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
@@ -98,7 +98,7 @@ fn extent(mesh: &Mesh, triangles: &[Triangle]) -> [f32; 2] {
     size
 }
 
-/// Point and normal at `uv`.
+/// Returns the point and normal at `uv`.
 fn locate(mesh: &Mesh, triangles: &[Triangle], uv: [f32; 2]) -> Option<(Vec3, Vec3)> {
     triangles.iter().find_map(|triangle| {
         let [a, b, c] = triangle.vertices.map(|i| mesh.vertices[i as usize]);

@@ -62,7 +62,7 @@ impl Bvh {
         self.build(right);
     }
 
-    /// Whether the ray from `origin` along the unit vector `direction` hits anything nearer than `far`.
+    /// Returns whether the ray from `origin` along the unit vector `direction` hits anything nearer than `far`.
     pub fn hit(&self, origin: &Vec3, direction: &Vec3, far: f32) -> bool {
         let inverse = direction.map(|d| 1.0 / d);
         let mut stack = [0u32; 64];

@@ -1,9 +1,9 @@
-//! Camera paths: key poses joined by minimum-jerk moves after the TUM freiburg3 sequences, or a round through the place;
-//! plus hand shake.
+//! Camera paths: key poses joined by minimum-jerk moves after the TUM freiburg3 sequences, or a circuit through the scene; plus
+//! hand shake.
 //!
-//! In: motion, seed and time. Out: the camera's pose in the world. Moves follow s(τ) = 10τ³ − 15τ⁴ + 6τ⁵ (Flash and Hogan,
-//! "The coordination of arm movements", 1985), so that velocity and acceleration are continuous everywhere; each lasts
-//! as long as its length asks for at the recording's mean speed.
+//! In: motion, seed and time. Out: the pose of the camera in the world. Moves follow s(τ) = 10τ³ − 15τ⁴ + 6τ⁵ (Flash and Hogan,
+//! "The coordination of arm movements", 1985), so that velocity and acceleration are continuous everywhere; the duration of each
+//! follows from its length and the mean speed of the recording.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -16,28 +16,28 @@ use crate::tour::{Pace, Tour};
 const XYZ_SPEED: f64 = 5.79 / 28.8;
 /// Mean speed of walking_halfsphere: 7.69 m in 35.8 s.
 const HALFSPHERE_SPEED: f64 = 7.69 / 35.8;
-/// Radius of the half sphere, m; "approximately one metre diameter" on the benchmark's page.
+/// Radius of the half sphere, m; "approximately one metre diameter" on the web page of the benchmark.
 const HALFSPHERE_RADIUS: f64 = 0.55;
-/// Mean turning rate of walking_rpy, rad/s (20.9°/s on the benchmark's page).
+/// Mean turning rate of walking_rpy, rad/s (20.9°/s on the web page of the benchmark).
 const RPY_RATE: f64 = 0.365;
-/// Distance of the camera in front of the point it is turned about (a little below it), m: gives rpy its 2.70 m in 30.6 s.
+/// Distance of the camera in front of the point it is turned about (slightly below it), m: gives rpy its 2.70 m in 30.6 s.
 const RPY_LEVER: f64 = 0.353;
 /// Amplitude of the hand shake per sine and axis, m and rad; gives walking_static its 0.28 m in 24.8 s.
 const SHAKE_M: f64 = 0.000_935;
 const SHAKE_RAD: f64 = 0.0008;
 
-/// A wheeled robot: slow, low, and rattled a little by its wheels.
+/// A wheeled robot: slow, low, and shaken slightly by its wheels.
 const DRIVE: Pace = Pace { speed: [0.7, 0.7], turn: 0.6, height: 0.85, tilt: 0.05, rounding: 0.6 };
 /// A person who carries the camera around.
 pub const WALK: Pace = Pace { speed: [0.4, 1.2], turn: 0.698, height: 1.35, tilt: 0.10, rounding: 0.9 };
-/// How far a loop is walked past its start, relative.
+/// Length of a loop beyond its start, relative.
 const LOOP_OVERLAP: f64 = 0.06;
 /// Frequencies (Hz) of hand shake and their weights: slow sway, wrist, and a trace of tremor.
 const HAND: [(f64, f64); 3] = [(0.35, 2.2), (1.3, 1.0), (4.1, 0.18)];
 /// The same for a robot: body and wheels.
 const WHEELS: [(f64, f64); 3] = [(0.8, 0.6), (3.1, 0.3), (6.3, 0.15)];
 
-/// Coordinates of a key pose: what they mean depends on the motion.
+/// Coordinates of a key pose; their meaning depends on the motion.
 type Key = Vector3<f64>;
 
 /// A camera path.
@@ -45,7 +45,7 @@ type Key = Vector3<f64>;
 pub struct CameraPath {
     motion: CameraMotion,
     base: Isometry3<f64>,
-    /// The round, for the motions that leave the place.
+    /// The circuit, for motions along one.
     tour: Option<Tour>,
     /// Start times of the moves, s; move k leads from key k to key k + 1 (the last back to key 0).
     starts: Vec<f64>,
@@ -55,7 +55,7 @@ pub struct CameraPath {
     shake: [[[f64; 3]; 3]; 6],
 }
 
-/// The pose of a camera at `eye` that looks at `target` with the horizon level.
+/// Returns the pose of a camera at `eye` directed at `target` with a level horizon.
 pub fn look_at(eye: Point3<f64>, target: Point3<f64>) -> Isometry3<f64> {
     let forward = (target - eye).normalize();
     let right = forward.cross(&Vector3::z()).normalize();
@@ -65,15 +65,15 @@ pub fn look_at(eye: Point3<f64>, target: Point3<f64>) -> Isometry3<f64> {
 }
 
 impl CameraPath {
-    /// The path of `config` in `scene`.
+    /// Creates the path of `config` in `scene`.
     pub fn new(config: &WorldConfig, scene: &Scene) -> Self {
         let motion = config.motion;
         let mut rng = Rng::new(config.seed, 0xca);
         let keys = keys(motion, &mut rng);
         let seconds = config.frames as f64 / config.camera.fps;
         let (tour, sines) = match motion {
-            CameraMotion::Drive => (Some(Tour::new(&scene.round, DRIVE, seconds)), WHEELS),
-            CameraMotion::Loop => (Some(Tour::new(&scene.round, WALK, seconds / (1.0 + LOOP_OVERLAP))), HAND),
+            CameraMotion::Drive => (Some(Tour::new(&scene.circuit, DRIVE, seconds)), WHEELS),
+            CameraMotion::Loop => (Some(Tour::new(&scene.circuit, WALK, seconds / (1.0 + LOOP_OVERLAP))), HAND),
             _ => (None, HAND),
         };
         let shake = shake(config.hand_shake, sines, &mut rng);
@@ -85,12 +85,12 @@ impl CameraPath {
         path
     }
 
-    /// The round, if the camera goes on one.
+    /// Returns the circuit, if the camera moves along one.
     pub fn tour(&self) -> Option<&Tour> {
         self.tour.as_ref()
     }
 
-    /// World from camera at `time` seconds.
+    /// Returns the pose (world from camera) at `time` seconds.
     pub fn pose(&self, time: f64) -> Isometry3<f64> {
         let [x, y, z, roll, pitch, yaw] = self.shake.map(|sines| {
             sines.iter().map(|[amplitude, omega, phase]| amplitude * (omega * time + phase).sin()).sum::<f64>()
@@ -117,7 +117,7 @@ impl CameraPath {
         self.keys[k % self.keys.len()]
     }
 
-    /// Camera pose relative to the base for the given coordinates; camera axes are right, down, forward.
+    /// Returns the camera pose relative to the base for the given coordinates; the camera axes are right, down, forward.
     fn local(&self, c: &Key) -> Isometry3<f64> {
         match self.motion {
             CameraMotion::Static | CameraMotion::Drive | CameraMotion::Loop => Isometry3::identity(),
@@ -136,7 +136,7 @@ impl CameraPath {
         }
     }
 
-    /// Duration of move k, s.
+    /// Returns the duration of move k, s.
     fn duration(&self, k: usize) -> f64 {
         let (from, to) = (self.key(k), self.key(k + 1));
         let steps = 32;
@@ -155,7 +155,7 @@ impl CameraPath {
     }
 }
 
-/// Rotation by `turn` about the point `pivot`.
+/// Returns the rotation by `turn` about the point `pivot`.
 fn around(pivot: Vector3<f64>, turn: UnitQuaternion<f64>) -> Isometry3<f64> {
     Translation3::from(pivot) * turn * Translation3::from(-pivot)
 }
@@ -164,7 +164,7 @@ fn minimum_jerk(t: f64) -> f64 {
     t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
 }
 
-/// Key poses of one round, with a little variation by the seed; three rounds differ, then the path repeats.
+/// Returns the key poses of one round, with a little variation by the seed; three rounds differ, then the path repeats.
 fn keys(motion: CameraMotion, rng: &mut Rng) -> Vec<Key> {
     let mut keys = Vec::new();
     for _ in 0..3 {
@@ -193,7 +193,7 @@ fn keys(motion: CameraMotion, rng: &mut Rng) -> Vec<Key> {
                 }
             }
             CameraMotion::Halfsphere => {
-                // Azimuth to the right, elevation up (a negative turn about the camera's x axis).
+                // Azimuth to the right, elevation up (a negative rotation about the x axis of the camera).
                 for (azimuth, elevation) in
                     [(0.7, 0.0), (0.5, -0.3), (0.0, -0.5), (-0.5, -0.3), (-0.75, 0.05), (-0.3, 0.2), (0.1, -0.2)]
                 {
@@ -262,7 +262,7 @@ mod tests {
                 (acceleration(t + h) - acceleration(t)).norm()
             });
             let largest = jumps.fold(0.0, f64::max);
-            // A step in acceleration would show at any time step; here jerk times one millisecond is the most.
+            // A step in acceleration would exceed this at any time step; jerk times one millisecond is the largest regular change.
             assert!(largest < 0.05, "{motion:?}: acceleration jumps by {largest} m/s²");
         }
     }

@@ -1,19 +1,19 @@
-//! Light that changes: supply voltage that wanders, and lamps that drop out for a moment.
+//! Changing light: supply voltage that varies, and lamps that drop out for a moment.
 //!
-//! In: strength, seed and time. Out: the brightness of the lamps that are not steady, 1 being normal. A pure function of
-//! time, continuous: sudden changes take [`SUDDEN_S`].
+//! In: strength, seed and time. Out: the brightness of the unsteady lamps; 1 is normal. It is a pure and continuous function of
+//! time: sudden changes take [`SUDDEN_S`].
 
 use crate::rng::hash;
 
 /// Seconds between the points of the slow change.
 const SLOW_S: f64 = 2.5;
-/// Seconds within which at most one drop-out happens, and the chance that it does.
+/// Seconds within which at most one drop-out happens, and its probability.
 const DROP_SLOT_S: f64 = 4.0;
 const DROP_CHANCE: f64 = 0.45;
 /// Duration of a sudden change, s: two frames at 30 Hz.
 const SUDDEN_S: f64 = 0.07;
 
-/// Brightness of flickering lamps at `time` seconds: within [1 − strength, 1 + 0.2 strength].
+/// Returns the brightness of flickering lamps at `time` seconds: within [1 − strength, 1 + 0.2 strength].
 pub fn brightness(strength: f32, seed: u64, time: f64) -> f32 {
     if strength <= 0.0 {
         return 1.0;
@@ -23,7 +23,7 @@ pub fn brightness(strength: f32, seed: u64, time: f64) -> f32 {
     (1.0 + f64::from(strength) * level) as f32
 }
 
-/// Uniform draw in [0, 1) for point `index` of stream `seed`.
+/// Returns a uniform draw in [0, 1) for point `index` of stream `seed`.
 fn draw(seed: u64, index: i64) -> f64 {
     (hash(seed, index as u64) >> 11) as f64 / 9_007_199_254_740_992.0
 }
@@ -33,13 +33,13 @@ fn smooth(t: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Smooth noise in [0, 1] with a new value at every whole number.
+/// Returns smooth noise in [0, 1] with a new value at every whole number.
 fn wander(seed: u64, t: f64) -> f64 {
     let (cell, s) = (t.floor() as i64, smooth(t - t.floor()));
     draw(seed, cell) * (1.0 - s) + draw(seed, cell + 1) * s
 }
 
-/// How far lamps have dropped out, in [0, 1].
+/// Returns how far lamps have dropped out, in [0, 1].
 fn drop_out(seed: u64, time: f64) -> f64 {
     let slot = (time / DROP_SLOT_S).floor() as i64;
     let t = time - slot as f64 * DROP_SLOT_S;

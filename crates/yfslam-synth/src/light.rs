@@ -1,19 +1,19 @@
-//! Light: area lamps with shadows for what stands still, cheap light and contact shadows for what moves.
+//! Light: area lamps with shadows for static surfaces, cheap light and contact shadows for moving ones.
 //!
-//! In: the lamps and a point. Out: its irradiance (linear RGB), with shadow rays for the light maps and without them for
-//! moving vertices; and the darkening that moving bodies cast around them (ambient occlusion of a sphere, Quílez,
-//! "Sphere ambient occlusion", 2006).
+//! In: the lamps and a point. Out: its irradiance (linear RGB), with shadow rays for the light maps and without them for moving
+//! vertices; and the darkening that moving bodies cast around them (ambient occlusion of a sphere, Quílez, "Sphere ambient
+//! occlusion", 2006).
 
 use crate::mesh::Vec3;
 
-/// A rectangular lamp (or window) that shines from its front.
+/// A rectangular lamp (or window) that emits light from its front.
 #[derive(Clone, Copy, Debug)]
 pub struct Lamp {
     /// Middle, m.
     pub center: Vec3,
     /// Half edges, m.
     pub half: [Vec3; 2],
-    /// Direction it shines to, unit.
+    /// Direction of the light, unit.
     pub normal: Vec3,
     /// Radiant power per area and direction, linear RGB.
     pub radiance: [f32; 3],
@@ -26,28 +26,28 @@ pub struct Lamp {
 pub struct Lights {
     /// Area lamps.
     pub lamps: Vec<Lamp>,
-    /// Light that bounces around the room, from above and from below, linear RGB.
+    /// Reflected light of the room, from above and from below, linear RGB.
     pub ambient: [[f32; 3]; 2],
 }
 
-/// A sphere of a moving body that shades its surroundings.
+/// A sphere of a moving body that darkens its surroundings.
 #[derive(Clone, Copy, Debug)]
 pub struct Occluder {
-    /// Centre in the coordinates in which points are given, m.
+    /// Centre in the coordinates of the points, m.
     pub center: Vec3,
     /// Radius, m.
     pub radius: f32,
 }
 
-/// Beyond this distance a hit does not dim ambient light any more, m.
+/// Beyond this distance a hit does not reduce ambient light, m.
 const AMBIENT_REACH_M: f32 = 1.5;
 /// Share of ambient light that still comes from a surface nearby.
 const BOUNCED: f32 = 0.35;
-/// Keeps light finite at the lamp itself, m².
+/// Keeps the light finite at the lamp itself, m².
 const SOFTENING_M2: f32 = 0.05;
-/// What a lamp adds less than this (irradiance) is left out: it could not change a grey level.
+/// Irradiance below which the contribution of a lamp is ignored: it could not change a grey level.
 const NEGLIGIBLE: f32 = 0.002;
-/// Lifts ray origins off their own surface, m.
+/// Offset of ray origins from their own surface, m.
 const OFFSET_M: f32 = 2e-3;
 
 impl Lamp {
@@ -55,7 +55,7 @@ impl Lamp {
         4.0 * self.half[0].norm() * self.half[1].norm()
     }
 
-    /// Whether the lamp could add anything that shows at `point`.
+    /// Returns whether the lamp could add a visible contribution at `point`.
     fn matters_at(&self, point: &Vec3) -> bool {
         let strongest = self.radiance.iter().copied().fold(0.0, f32::max);
         strongest * self.area() > NEGLIGIBLE * (self.center - point).norm_squared()
@@ -63,9 +63,9 @@ impl Lamp {
 }
 
 impl Lights {
-    /// Irradiance at a point, and in the fourth lane the share of it that flickers. `hidden(origin, direction, distance)`
-    /// tells whether something is in the way; `samples` is the number of rays per lamp and twice as many for the ambient
-    /// term. All points use the same sample pattern: what error remains is smooth over a surface instead of mottled.
+    /// Returns the irradiance at a point, and in the fourth lane the share of it that flickers. `hidden(origin, direction,
+    /// distance)` returns whether the ray is blocked; `samples` is the number of rays per lamp; the ambient term takes
+    /// twice as many. All points use the same sample pattern: the remaining error is smooth over a surface instead of mottled.
     pub fn irradiance(
         &self,
         point: &Vec3,
@@ -105,7 +105,7 @@ impl Lights {
         [total[0], total[1], total[2], flickering]
     }
 
-    /// Share of all power that comes from flickering lamps; light that bounces around has this share, too.
+    /// Returns the share of all power that comes from flickering lamps; reflected light has this share too.
     fn unsteady_share(&self) -> f32 {
         let power = |lamp: &Lamp| lamp.area() * lamp.radiance.iter().sum::<f32>();
         let all: f32 = self.lamps.iter().map(power).sum();
@@ -113,7 +113,7 @@ impl Lights {
         if all > 0.0 { unsteady / all } else { 0.0 }
     }
 
-    /// The same lamps while those that flicker are at `brightness`.
+    /// Returns the same lamps with those that flicker at `brightness`.
     pub fn dimmed(&self, brightness: f32) -> Self {
         let share = self.unsteady_share();
         let mut dimmed = self.clone();
@@ -125,20 +125,20 @@ impl Lights {
         dimmed
     }
 
-    /// Light from all around, by how far up a surface looks.
+    /// Returns the ambient light for a normal, by how far it points up.
     fn ambient_light(&self, normal: &Vec3) -> [f32; 3] {
         let up = 0.5 + 0.5 * normal.z;
         std::array::from_fn(|k| self.ambient[0][k] * up + self.ambient[1][k] * (1.0 - up))
     }
 
-    /// Light on a moving vertex: lamps without shadow rays, and the ambient term.
+    /// Returns the light on a moving vertex: lamps without shadow rays, and the ambient term.
     pub fn on_vertex(&self, point: &Vec3, normal: &Vec3) -> [f32; 3] {
         let mut sum = [0.0; 3];
         for lamp in self.lamps.iter().filter(|lamp| lamp.matters_at(point)) {
             let to = lamp.center - point;
             let distance2 = to.norm_squared();
             let direction = to / distance2.sqrt();
-            // A large lamp lights a little around the corner.
+            // A large lamp also lights surfaces slightly turned away.
             let facing = (normal.dot(&direction) * 0.8 + 0.2).max(0.0) * (-lamp.normal.dot(&direction)).max(0.0);
             let gain = facing * lamp.area() / (distance2 + SOFTENING_M2);
             (0..3).for_each(|k| sum[k] += lamp.radiance[k] * gain);
@@ -149,12 +149,12 @@ impl Lights {
 }
 
 impl Occluder {
-    /// Distance from which the sphere does not matter, m: seven radii, where it would take 2 % of the light.
+    /// Returns the distance beyond which the sphere is ignored, m: seven radii, where it would take 2 % of the light.
     pub fn reach(&self) -> f32 {
         7.0 * self.radius
     }
 
-    /// Share of light that the sphere leaves at a point with the given normal.
+    /// Returns the share of light that the sphere leaves at a point with the given normal.
     #[inline]
     pub fn visibility(&self, point: &Vec3, normal: &Vec3) -> f32 {
         let to = self.center - point;
@@ -169,14 +169,14 @@ impl Occluder {
     }
 }
 
-/// Point number `i` of a sequence that fills [0, 1]² evenly: the additive recurrence of the plastic number (Roberts,
-/// "The unreasonable effectiveness of quasirandom sequences", 2018).
+/// Returns point number `i` of a sequence that fills [0, 1]² evenly: the additive recurrence of the plastic number (Roberts, "The
+/// unreasonable effectiveness of quasirandom sequences", 2018).
 pub fn scattered(i: usize) -> [f32; 2] {
     let n = i as f32 + 0.5;
     [(n * 0.754_877_7).fract(), (n * 0.569_840_3).fract()]
 }
 
-/// Cosine-weighted direction around `normal` (Malley's method).
+/// Returns a cosine-weighted direction around `normal` (Malley's method).
 pub fn hemisphere(normal: &Vec3, s: f32, t: f32) -> Vec3 {
     let axis = if normal.z.abs() < 0.7 { Vec3::z() } else { Vec3::x() };
     let a = normal.cross(&axis).normalize();
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn the_flickering_share_of_light_is_what_dimming_takes_away() {
+    fn the_flickering_share_of_light_is_removed_by_dimming() {
         let lights = Lights { lamps: vec![lamp(-1.0, true), lamp(1.5, false)], ambient: [[0.3; 3], [0.2; 3]] };
         let at = |lights: &Lights| lights.irradiance(&Vec3::new(0.4, 0.2, 0.0), &Vec3::z(), 4, &|_, _, _| false);
         let (full, dim) = (at(&lights), at(&lights.dimmed(0.3)));

@@ -1,7 +1,7 @@
 //! Triangle meshes made of curved or flat grids ("patches"), each with its own texture over [0, 1]².
 //!
-//! In: functions that map (u, v) to a surface. Out: vertices, triangles and patches ready for the rasteriser. A texture's
-//! top left is (0, 0); seen from outside, u runs to the right and v down.
+//! In: functions that map (u, v) to a surface. Out: vertices, triangles and patches for the rasteriser. The top left of a texture
+//! is (0, 0); seen from outside, u runs to the right and v down.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -17,7 +17,7 @@ pub struct Vertex {
     pub normal: Vec3,
     /// Texture coordinates in [0, 1]².
     pub uv: [f32; 2],
-    /// Light that arrives here (linear RGB), used where the patch says [`Lighting::Vertex`].
+    /// Irradiance (linear RGB), used where the patch has [`Lighting::Vertex`].
     pub light: [f32; 3],
 }
 
@@ -30,25 +30,25 @@ pub struct Triangle {
     pub patch: u32,
 }
 
-/// Where the light on a patch comes from.
+/// Source of the light on a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lighting {
-    /// From a light map with shadows, for things that never move.
+    /// A light map with shadows, for static objects.
     Baked,
-    /// Interpolated from the vertices, for things that move.
+    /// Interpolated from the vertices, for moving objects.
     Vertex,
-    /// Shines by itself with this factor on its texture.
+    /// Emits light: the texture times this factor.
     Emissive(f32),
     /// The same for a lamp that flickers.
     Lamp(f32),
 }
 
-/// A piece of surface with one texture.
+/// A part of a surface with one texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patch {
     /// Index of the texture.
     pub texture: u32,
-    /// How it is lit.
+    /// Lighting.
     pub lighting: Lighting,
     /// 0 for the static world, k for actor k (counted from 1).
     pub instance: u8,
@@ -92,11 +92,11 @@ impl Mesh {
     }
 
     /// Adds a closed surface around +z of `nu` × `nv` cells whose normals follow from its shape; `surface` gives the position
-    /// at (u, v), u once around from +x over +y, v downwards.
+    /// at (u, v), u once around from +x over +y, v downward.
     pub fn sculpture(&mut self, nu: u32, nv: u32, patch: Patch, surface: impl Fn(f32, f32) -> Vec3) {
         const STEP: f32 = 0.01;
         self.grid(nu, nv, patch, |u, v| {
-            // u = 0 and u = 1 must be the same point to the bit, or the seam would show.
+            // u = 0 and u = 1 must be the same point to the bit, or the seam would be visible.
             let u = if u >= 1.0 { 0.0 } else { u };
             let around = |d: f32| surface((u + d).rem_euclid(1.0), v.clamp(STEP, 1.0 - STEP));
             let along = |d: f32| surface(u, (v + d).clamp(0.0, 1.0));
@@ -118,7 +118,7 @@ impl Mesh {
         let ring = |j: usize| rings[j.min(last)];
         self.grid(segments, last as u32, patch, |u, v| {
             let j = (v * last as f32).round() as usize;
-            // u = 0 and u = 1 must be the same point to the bit, or the seam would show.
+            // u = 0 and u = 1 must be the same point to the bit, or the seam would be visible.
             let (sin, cos) = if u >= 1.0 { (0.0, 1.0) } else { (u * std::f32::consts::TAU).sin_cos() };
             let [z, rx, ry] = ring(j);
             let (above, below) = (ring(j.saturating_sub(1)), ring(j + 1));
@@ -176,7 +176,7 @@ mod tests {
     fn triangles_wind_counter_clockwise_around_their_normals() {
         let mut mesh = Mesh::default();
         mesh.rectangle(Vec3::zeros(), Vec3::x(), -Vec3::z(), PATCH);
-        assert_eq!(mesh.vertices[0].normal, -Vec3::y(), "a poster on the far wall looks towards the camera");
+        assert_eq!(mesh.vertices[0].normal, -Vec3::y(), "a poster on the far wall faces the camera");
         mesh.loft(12, &[[0.3, 0.0, 0.0], [0.2, 0.2, 0.1], [-0.1, 0.3, 0.1], [-0.2, 0.0, 0.0]], PATCH);
         winding_agrees_with_normals(&mesh);
     }

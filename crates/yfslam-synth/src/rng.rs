@@ -1,6 +1,6 @@
-//! Seeded randomness: hashes for random access (one draw per pixel and frame) and a small stream generator.
+//! Seeded random numbers: hashes for random access (one draw per pixel and frame) and a small stream generator.
 //!
-//! In: a seed and a stream number. Out: the same draws on every machine and thread. The mixer is the finaliser of
+//! In: a seed and a stream number. Out: the same draws on every machine and thread. The mixing function is the finaliser of
 //! SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014, figure 16).
 
 /// Mixes 64 bits so that each input bit flips each output bit with probability one half.
@@ -10,12 +10,12 @@ pub fn mix(mut x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Hash of a seed and one index.
+/// Returns the hash of a seed and one index.
 pub fn hash(seed: u64, index: u64) -> u64 {
     mix(seed ^ mix(index.wrapping_add(0x9e37_79b9_7f4a_7c15)))
 }
 
-/// Four independent, nearly normal draws of zero mean and unit variance, within ±3.47 sigma.
+/// Returns four independent, nearly normal draws of zero mean and unit variance, within ±3.47 sigma.
 pub fn normals4(bits: u64) -> [f32; 4] {
     // Irwin–Hall of order 4 on 16-bit words from two mixes: variance 4/12, so sqrt(3) scales it to one.
     let more = mix(bits ^ 0x5851_f42d_4c95_7f2d);
@@ -27,43 +27,43 @@ pub fn normals4(bits: u64) -> [f32; 4] {
     })
 }
 
-/// A stream of draws for building the world (SplitMix64).
+/// A stream of draws for building a world (SplitMix64).
 #[derive(Clone, Debug)]
 pub struct Rng(u64);
 
 impl Rng {
-    /// The stream number `stream` of `seed`; streams do not overlap in practice.
+    /// Creates stream number `stream` of `seed`; streams do not overlap in practice.
     pub fn new(seed: u64, stream: u64) -> Self {
         Self(hash(seed, stream))
     }
 
-    /// The next 64 bits.
+    /// Returns the next 64 bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         mix(self.0)
     }
 
-    /// Uniform in [low, high).
+    /// Returns a uniform draw in [low, high).
     pub fn range(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * ((self.bits() >> 40) as f32 / 16_777_216.0)
     }
 
-    /// Uniform in [low, high), f64.
+    /// Returns a uniform draw in [low, high) as `f64`.
     pub fn range64(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * ((self.bits() >> 11) as f64 / 9_007_199_254_740_992.0)
     }
 
-    /// Uniform in 0..n; 0 if `n` is 0.
+    /// Returns a uniform draw in 0..n; 0 if `n` is 0.
     pub fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.bits()) * n as u128) >> 64) as usize
     }
 
-    /// True with probability `p`.
+    /// Returns true with probability `p`.
     pub fn chance(&mut self, p: f32) -> bool {
         self.range(0.0, 1.0) < p
     }
 
-    /// One of `items`.
+    /// Returns one of `items`.
     pub fn pick<T: Copy, const N: usize>(&mut self, items: [T; N]) -> T {
         const { assert!(N > 0) };
         items[self.below(N)]

@@ -1,6 +1,6 @@
-//! Worlds named by a line of text, such as `synth:walking_xyz?seed=7&people=2&frames=300`.
+//! Descriptions of worlds in one line of text, such as `synth:walking_xyz?seed=7&people=2&frames=300`.
 //!
-//! In: the text. Out: a [`WorldConfig`], or an error that lists what would be right.
+//! In: the text. Out: a [`WorldConfig`], or an error that lists the valid names.
 
 use yfslam::Camera;
 
@@ -9,7 +9,7 @@ use crate::config::{
 };
 use crate::suite::{DEFAULT_NAME, find, names};
 
-/// Keys of a spec and what they set.
+/// Keys of a description and their values.
 const KEYS: &[(&str, &str)] = &[
     ("scene", "office, rescue, corridor or lab"),
     ("motion", "static, xyz, rpy, halfsphere, drive or loop"),
@@ -17,52 +17,52 @@ const KEYS: &[(&str, &str)] = &[
     ("people", "0 to 6"),
     ("activity", "sitting, walking or crowd"),
     ("robots", "0 to 6, with the people at most 6"),
-    ("chair", "on or off: someone pushes a chair"),
-    ("carry", "on or off: someone carries something, puts it down and fetches it"),
-    ("object", "box or laptop: what is carried"),
+    ("chair", "on or off: a person pushes a chair"),
+    ("carry", "on or off: a person carries an object, puts it down and fetches it"),
+    ("object", "box or laptop: the carried object"),
     ("moved", "on or off: a box is displaced while out of view"),
     ("frames", "number of frames"),
     ("share", "share of the view that people cover, 0 to 0.8"),
     ("width", "px"),
     ("height", "px"),
     ("fps", "frames per second"),
-    ("stereo", "m from the left to a right camera, such as 0.11, in place of depth; 0 is none"),
+    ("stereo", "m from the left to a right camera, such as 0.11, instead of depth; 0 is none"),
     ("shake", "hand shake, 1 is natural"),
     ("noise", "on or off: off is the perfect sensor, without any of the effects below"),
-    ("blur", "ms for which the shutter is open; 0 is off"),
+    ("blur", "exposure time in ms; 0 is off"),
     ("autoexposure", "on or off"),
     ("offset_ms", "ms from the colour image to its depth image, such as 12; 0 is off"),
-    ("holes", "on or off: places without depth at edges, on grazing and on dark surfaces"),
+    ("holes", "on or off: pixels without depth at edges, on grazing and on dark surfaces"),
     ("boxes", "on or off: exact person boxes as detections"),
     ("shadows", "on or off"),
-    ("exposure", "brightness of the picture, 1 is normal"),
+    ("exposure", "brightness of the image, 1 is normal"),
     ("flicker", "changing light, 0 to 1"),
 ];
 
-/// Whether `text` is meant as a synthetic world (it starts with `synth:`).
+/// Returns whether `text` describes a synthetic world, that is, starts with `synth:`.
 pub fn is_spec(text: &str) -> bool {
     text.starts_with("synth:")
 }
 
-/// The name in a spec, and what follows its question mark.
+/// Splits a description into the name and the text after the question mark.
 pub fn split(spec: &str) -> (&str, &str) {
     let text = spec.strip_prefix("synth:").unwrap_or(spec);
     let (name, query) = text.split_once('?').unwrap_or((text, ""));
     (if name.is_empty() { DEFAULT_NAME } else { name }, query)
 }
 
-/// Reads a spec; the prefix `synth:` may be left out, an empty name means `walking_xyz`.
+/// Parses a description; the prefix `synth:` is optional, and an empty name means `walking_xyz`.
 ///
 /// # Errors
-/// If the name or a key is unknown, or a value cannot be read or is out of range. The message lists the valid names.
+/// The name or a key is unknown, or a value is malformed or out of range. The message lists the valid names.
 pub fn parse(spec: &str) -> Result<WorldConfig, WorldError> {
     parse_with_camera(spec, default_camera())
 }
 
-/// Reads a spec for another camera than the default; `width`, `height` and `fps` in the spec change that camera.
+/// Parses a description for another camera than the default; its `width`, `height` and `fps` change that camera.
 ///
 /// # Errors
-/// As for [`parse`], also if `camera` is none that can be rendered.
+/// As for [`parse`], also if `camera` cannot be rendered.
 pub fn parse_with_camera(spec: &str, camera: Camera) -> Result<WorldConfig, WorldError> {
     let fail = |reason: String| WorldError::Spec { spec: spec.to_owned(), reason };
     let (name, query) = split(spec);
@@ -97,7 +97,7 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
         "moved" => config.actors.moved_object = switch(key, value)?,
         "frames" => config.frames = number(key, value)?,
         "share" => config.person_share = number(key, value)?,
-        // The view stays the same when the size changes: intrinsics scale about the pixel grid's corner.
+        // The view stays the same when the size changes: the intrinsics scale about the corner of the pixel grid.
         "width" => {
             let width = number(key, value)?;
             let scale = width as f64 / camera.width as f64;
@@ -147,7 +147,7 @@ fn number<T: std::str::FromStr>(key: &str, value: &str) -> Result<T, String> {
     value.parse().map_err(|_| format!("`{key}={value}`: `{value}` cannot be read as {meaning}"))
 }
 
-/// The variant named `value`.
+/// Returns the variant named `value`.
 fn one_of<T: Copy>(key: &str, value: &str, all: &[(&str, T)]) -> Result<T, String> {
     let names = || all.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let found = all.iter().find(|(name, _)| *name == value);

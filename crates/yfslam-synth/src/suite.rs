@@ -1,28 +1,28 @@
-//! The standing suite: worlds with names, each hard in one way.
+//! The suite of named worlds, each difficult in one way.
 //!
-//! In: a name. Out: what differs from [`WorldConfig::default`]. The eight `sitting_*` and `walking_*` follow the freiburg3 sequences of
-//! the TUM RGB-D benchmark (Sturm et al., IROS 2012).
+//! In: a name. Out: the differences from [`WorldConfig::default`]. The eight `sitting_*` and `walking_*` follow the freiburg3
+//! sequences of the TUM RGB-D benchmark (Sturm et al., IROS 2012).
 
 use crate::config::{Activity, CameraMotion, SceneKind, WorldConfig};
 
 /// A world of the suite.
 #[derive(Clone, Copy, Debug)]
 pub struct NamedWorld {
-    /// Name in specs, such as `walking_xyz`.
+    /// Name in descriptions, such as `walking_xyz`.
     pub name: &'static str,
-    /// What happens in it, one line.
+    /// Description in one line.
     pub about: &'static str,
     set: fn(&mut WorldConfig),
 }
 
-/// The world that an empty name means.
+/// The world for an empty name.
 pub const DEFAULT_NAME: &str = "walking_xyz";
 
 const fn world(name: &'static str, about: &'static str, set: fn(&mut WorldConfig)) -> NamedWorld {
     NamedWorld { name, about, set }
 }
 
-/// All worlds of the suite, in the order of tables.
+/// All worlds of the suite, in the order of the tables.
 pub const SUITE: &[NamedWorld] = &[
     world("sitting_static", "people sit at the desk and gesture; the camera is held still", |c| {
         sitting(c, CameraMotion::Static);
@@ -36,21 +36,21 @@ pub const SUITE: &[NamedWorld] = &[
     world("sitting_halfsphere", "people sit and gesture; the camera moves on a half sphere", |c| {
         sitting(c, CameraMotion::Halfsphere);
     }),
-    world("walking_static", "people walk through the picture; the camera is held still", |c| {
+    world("walking_static", "people walk through the image; the camera is held still", |c| {
         walking(c, CameraMotion::Static);
     }),
-    world("walking_xyz", "people walk through the picture; the camera moves along its three axes", |c| {
+    world("walking_xyz", "people walk through the image; the camera moves along its three axes", |c| {
         walking(c, CameraMotion::Xyz);
     }),
-    world("walking_rpy", "people walk through the picture; the camera rolls, pitches and yaws", |c| {
+    world("walking_rpy", "people walk through the image; the camera rolls, pitches and yaws", |c| {
         walking(c, CameraMotion::Rpy);
     }),
-    world("walking_halfsphere", "people walk through the picture; the camera moves on a half sphere", |c| {
+    world("walking_halfsphere", "people walk through the image; the camera moves on a half sphere", |c| {
         walking(c, CameraMotion::Halfsphere);
     }),
     world(
         "pushed_chair",
-        "someone pushes a chair around the desk while another one walks; the camera moves along its axes",
+        "a person pushes a chair around the desk while another one walks; the camera moves along its axes",
         |c| {
             passing(c, CameraMotion::Xyz);
             c.actors.pushed_chair = true;
@@ -58,13 +58,13 @@ pub const SUITE: &[NamedWorld] = &[
     ),
     world(
         "carried_box",
-        "someone carries a box, puts it down, leaves it and fetches it; the camera moves on a half sphere",
+        "a person carries a box, puts it down, leaves it and fetches it; the camera moves on a half sphere",
         |c| {
             walking(c, CameraMotion::Halfsphere);
             c.actors.carried_box = true;
         },
     ),
-    world("crowd", "six people, one of whom sits and one sits down and gets up, fill half of the picture", |c| {
+    world("crowd", "six people, one of whom sits and one sits down and gets up, fill half of the image", |c| {
         (c.activity, c.motion) = (Activity::Crowd, CameraMotion::Xyz);
         (c.people, c.person_share) = (6, 0.5);
     }),
@@ -74,7 +74,7 @@ pub const SUITE: &[NamedWorld] = &[
         |c| {
             passing(c, CameraMotion::Loop);
             c.scene = SceneKind::Corridor;
-            // All the way round: one walks ahead of the camera, one comes towards it.
+            // Once around: one person walks ahead of the camera, one comes towards it.
             c.person_share = 0.1;
             c.frames = 1250;
         },
@@ -94,30 +94,30 @@ fn sitting(config: &mut WorldConfig, motion: CameraMotion) {
     (config.activity, config.motion) = (Activity::Sitting, motion);
 }
 
-/// Two and two stroll past: enough to lead most of the picture's corners along, little enough to leave walls to hold on to.
+/// Two pairs walk past: enough to move most of the corners of the image, but few enough to leave walls to track.
 fn walking(config: &mut WorldConfig, motion: CameraMotion) {
     (config.activity, config.motion) = (Activity::Walking, motion);
     (config.people, config.person_share) = (4, 0.3);
 }
 
-/// Two people, for narrow places and where something else is hard.
+/// Two people, for narrow places and worlds with another difficulty.
 fn passing(config: &mut WorldConfig, motion: CameraMotion) {
     (config.activity, config.motion) = (Activity::Walking, motion);
 }
 
 impl NamedWorld {
-    /// Sets what makes this world.
+    /// Applies the settings of this world.
     pub(crate) fn apply(&self, config: &mut WorldConfig) {
         (self.set)(config);
     }
 }
 
-/// Names of all worlds of the suite.
+/// Returns the names of all worlds of the suite.
 pub fn names() -> Vec<&'static str> {
     SUITE.iter().map(|world| world.name).collect()
 }
 
-/// The world of that name.
+/// Returns the world with this name.
 pub fn find(name: &str) -> Option<&'static NamedWorld> {
     SUITE.iter().find(|world| world.name == name)
 }

@@ -1,7 +1,7 @@
-//! Textures and light maps, made when a surface is first seen.
+//! Textures and light maps, computed when a surface is first visible.
 //!
-//! In: what was ordered. Out: the texture and the light map of a surface. Most of a place is out of sight of any one
-//! sequence; what is made depends on the order alone, not on when it is made.
+//! In: the ordered textures. Out: the texture and the light map of a surface. Most of a scene is invisible in any one sequence; the
+//! result depends on the order alone and not on the time of computation.
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -24,7 +24,7 @@ pub struct Surfaces {
     light_maps: Vec<OnceLock<LightMap>>,
 }
 
-/// Something to be made.
+/// A texture or light map that is to be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Job {
     Paint(u32),
@@ -32,25 +32,25 @@ enum Job {
 }
 
 impl Surfaces {
-    /// Surfaces with `sharpness` times the texels per metre that were ordered, lit by `baker`.
+    /// Creates surfaces with `sharpness` times the ordered texels per metre, lit by `baker`.
     pub fn new(palette: Palette, sharpness: f32, mesh: &Mesh, baker: Baker) -> Self {
         let textures = (0..palette.len()).map(|_| OnceLock::new()).collect();
         let light_maps = mesh.patches.iter().map(|_| OnceLock::new()).collect();
         Self { palette, sharpness, baker, textures, light_maps }
     }
 
-    /// The texture number `index`.
+    /// Returns texture number `index`.
     pub fn texture(&self, index: u32) -> &Texture {
         self.textures[index as usize].get_or_init(|| self.palette.paint(index as usize, self.sharpness))
     }
 
-    /// The light map of patch number `patch` of the static mesh.
+    /// Returns the light map of patch number `patch` of the static mesh.
     pub fn light_map(&self, mesh: &Mesh, patch: u32) -> &LightMap {
         self.light_maps[patch as usize].get_or_init(|| self.baker.bake(mesh, patch as usize))
     }
 
-    /// Makes what the patches need and is not there yet, on all threads; `mesh` is the static one, by which alone
-    /// patches with light maps count.
+    /// Computes the missing textures and light maps of the patches, on all threads; only patches of `mesh`, the static one, have
+    /// light maps.
     pub fn prepare<'a>(&self, mesh: &Mesh, patches: impl Iterator<Item = (&'a Mesh, u32)>) {
         let mut jobs = BTreeSet::new();
         for (of, index) in patches {
@@ -62,7 +62,7 @@ impl Surfaces {
                 jobs.insert(Job::Bake(index));
             }
         }
-        // No job starts another, so that no thread ever waits for itself.
+        // No job starts another, so that no thread waits for itself.
         let jobs: Vec<Job> = jobs.into_iter().collect();
         jobs.par_iter().with_max_len(1).for_each(|job| match *job {
             Job::Paint(texture) => drop(self.texture(texture)),

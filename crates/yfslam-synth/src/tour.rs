@@ -1,14 +1,14 @@
-//! A round through a place, on wheels or on foot, with the camera looking ahead.
+//! A circuit through a scene, on wheels or on foot, with the camera directed ahead.
 //!
-//! In: way-points on the floor and a pace. Out: the camera's pose at any time. The corners of the round are averaged
-//! away, the pace drops where it would turn too fast, and the result, sampled evenly in time, is read through a uniform
-//! cubic B-spline (de Boor, "A practical guide to splines", 1978): position, velocity and acceleration are continuous.
+//! In: waypoints on the floor and a pace. Out: the pose of the camera at any time. The corners of the circuit are averaged away,
+//! the pace drops where it would turn too fast, and the result, sampled evenly in time, is read through a uniform cubic B-spline
+//! (de Boor, "A practical guide to splines", 1978): position, velocity and acceleration are continuous.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::camera_path::look_at;
 
-/// How a round is done.
+/// Pace on a circuit.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     /// Slowest and fastest speed on a straight, m/s.
@@ -23,34 +23,35 @@ pub struct Pace {
     pub rounding: f64,
 }
 
-/// A closed round with a time-table.
+/// A closed circuit with a timetable.
 #[derive(Clone, Debug)]
 pub struct Tour {
-    /// x, y, and the direction of view (cosine, sine) every [`TICK_S`] or a little less, for one round.
+    /// x, y, and the direction of view (cosine, sine) every [`TICK_S`] or slightly less, for one round.
     ticks: Vec<[f64; 4]>,
     tick: f64,
     pace: Pace,
 }
 
-/// Distance between points of the way, m.
+/// Distance between points of the route, m.
 const SPACING_M: f64 = 0.02;
-/// Greatest time between two points of the time-table, s.
+/// Greatest time between two points of the timetable, s.
 const TICK_S: f64 = 0.1;
-/// One looks from a little behind oneself to a place ahead, m: people and robots look into a bend.
+/// The direction of view points from a little behind the camera to a place ahead, m: people and robots look into a bend.
 const LOOK_M: [f64; 2] = [-0.3, 0.9];
 
 impl Tour {
-    /// A round through `corners` that takes `seconds` if the pace allows it, else as near as it does.
+    /// Creates a circuit through `corners` that takes `seconds` if the pace allows it, otherwise as close to that as possible.
     pub fn new(corners: &[[f64; 2]], pace: Pace, seconds: f64) -> Self {
-        let way = rounded(corners, pace.rounding);
-        let looks = looks(&way);
-        let count = way.len();
-        let lengths: Vec<f64> = (0..count).map(|i| distance(way[i], way[(i + 1) % count])).collect();
-        let bends: Vec<f64> = (0..count).map(|i| angle_between(looks[i], looks[(i + 1) % count])).collect();
+        let route = rounded(corners, pace.rounding);
+        let view_directions = view_directions(&route);
+        let count = route.len();
+        let lengths: Vec<f64> = (0..count).map(|i| distance(route[i], route[(i + 1) % count])).collect();
+        let bends: Vec<f64> =
+            (0..count).map(|i| angle_between(view_directions[i], view_directions[(i + 1) % count])).collect();
         let times = |top: f64| -> Vec<f64> {
             let speeds: Vec<f64> =
                 lengths.iter().zip(&bends).map(|(l, a)| top.min(pace.turn * l / a.max(1e-9))).collect();
-            // The slowest of a neighbourhood, averaged over it: never faster than allowed, never an abrupt brake.
+            // The slowest speed of a neighbourhood, averaged over it: never faster than allowed and without abrupt braking.
             let reach = ((0.8 / SPACING_M) as usize).min(count / 4);
             let slowest: Vec<f64> = (0..count)
                 .map(|i| (0..=2 * reach).map(|k| speeds[(i + count + k - reach) % count]).fold(top, f64::min))
@@ -76,13 +77,14 @@ impl Tour {
             }
             let t = ((time - at) / steps[i]).min(1.0);
             let blend = |a: [f64; 2], b: [f64; 2]| [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
-            let ([x, y], [c, s]) = (blend(way[i], way[(i + 1) % count]), blend(looks[i], looks[(i + 1) % count]));
+            let ([x, y], [c, s]) =
+                (blend(route[i], route[(i + 1) % count]), blend(view_directions[i], view_directions[(i + 1) % count]));
             [x, y, c, s]
         });
         Self { ticks: ticks.collect(), tick, pace }
     }
 
-    /// World from camera at `time` seconds.
+    /// Returns the pose (world from camera) at `time` seconds.
     pub fn pose(&self, time: f64) -> Isometry3<f64> {
         let [x, y, c, s] = self.at(time);
         let eye = Point3::new(x, y, self.pace.height);
@@ -90,31 +92,31 @@ impl Tour {
         look_at(eye, eye + ahead - Vector3::z() * self.pace.tilt)
     }
 
-    /// Place on the floor at `time` seconds, m.
+    /// Returns the place on the floor at `time` seconds, m.
     pub fn place(&self, time: f64) -> [f64; 2] {
         let [x, y, ..] = self.at(time);
         [x, y]
     }
 
-    /// Time of one round, s.
+    /// Returns the time of one round, s.
     pub fn period(&self) -> f64 {
         self.tick * self.ticks.len() as f64
     }
 
-    /// Length of one round, m.
+    /// Returns the length of one round, m.
     pub fn length(&self) -> f64 {
         let points = self.ticks.iter().zip(self.ticks.iter().cycle().skip(1));
         points.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum()
     }
 
-    /// Time at which the round is nearest to `place`, s.
+    /// Returns the time at which the circuit is nearest to `place`, s.
     pub fn time_near(&self, place: [f64; 2]) -> f64 {
         let away = |at: &[f64; 4]| distance([at[0], at[1]], place);
         let nearest = self.ticks.iter().enumerate().min_by(|(_, a), (_, b)| away(a).total_cmp(&away(b)));
         nearest.map_or(0.0, |(k, _)| k as f64 * self.tick)
     }
 
-    /// Place and direction of view at `time` seconds.
+    /// Returns the place and direction of view at `time` seconds.
     fn at(&self, time: f64) -> [f64; 4] {
         let ticks = (time / self.tick).rem_euclid(self.ticks.len() as f64);
         let (k, t) = (ticks as usize, ticks.fract());
@@ -131,7 +133,7 @@ impl Tour {
     }
 }
 
-/// Points along the closed polygon, evenly spaced, averaged three times so that corners become bends.
+/// Returns evenly spaced points along the closed polygon, averaged three times so that corners become bends.
 fn rounded(corners: &[[f64; 2]], rounding: f64) -> Vec<[f64; 2]> {
     let sides = corners.iter().zip(corners.iter().cycle().skip(1));
     let mut points = Vec::new();
@@ -157,10 +159,10 @@ fn averaged<const N: usize>(values: &[[f64; N]], width: usize) -> Vec<[f64; N]> 
     (0..count).map(mean).collect()
 }
 
-/// Unit direction of view at every point of the way.
-fn looks(way: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let count = way.len();
-    let at = |i: usize, metres: f64| way[(i as i64 + (metres / SPACING_M) as i64).rem_euclid(count as i64) as usize];
+/// Returns the unit direction of view at every point of the route.
+fn view_directions(route: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let count = route.len();
+    let at = |i: usize, metres: f64| route[(i as i64 + (metres / SPACING_M) as i64).rem_euclid(count as i64) as usize];
     let chord = |i: usize| {
         let (from, to) = (at(i, LOOK_M[0]), at(i, LOOK_M[1]));
         let length = distance(from, to).max(1e-9);
@@ -185,7 +187,7 @@ mod tests {
     const CORNERS: [[f64; 2]; 5] = [[0.0, 0.0], [0.0, 6.0], [10.0, 6.0], [10.0, -4.0], [0.0, -4.0]];
 
     #[test]
-    fn a_round_takes_the_time_given_unless_that_would_be_too_fast() {
+    fn a_circuit_takes_the_given_time_unless_that_would_be_too_fast() {
         assert!((Tour::new(&CORNERS, PACE, 60.0).period() - 60.0).abs() < 0.1);
         let rushed = Tour::new(&CORNERS, PACE, 10.0).period();
         assert!((31.0..38.0).contains(&rushed), "40 m with rounded corners in {rushed} s");

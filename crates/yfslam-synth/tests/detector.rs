@@ -1,4 +1,4 @@
-//! The official detector finds the synthetic people, with the sensor's noise on. Needs the model of the data folder.
+//! The official detector finds the synthetic people, with sensor noise. Needs the model of the data folder.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod recall;
@@ -7,7 +7,7 @@ use recall::{Table, measure, official_detector};
 use yfslam_synth::{World, parse};
 
 #[test]
-fn the_official_detector_finds_six_of_ten_people_taller_than_thirty_percent_of_the_picture() {
+fn the_official_detector_finds_six_of_ten_people_taller_than_thirty_percent_of_the_image() {
     let Some(mut detector) = official_detector() else {
         eprintln!("skipped: no official model; set YFSLAM_DATA to a folder that has models/yolo-fastestv2-coco.onnx");
         return;
@@ -23,14 +23,14 @@ fn the_official_detector_finds_six_of_ten_people_taller_than_thirty_percent_of_t
         ("walking_xyz?activity=crowd&people=6&share=0.35&seed=7", 30),
     ] {
         let mut config = parse(spec).unwrap();
-        // Soft light costs most of the time to build a world and changes people little.
+        // Soft shadows take most of the time to build a world and change people little.
         config.light.shadow_rays = 2;
         measure(&World::new(&config).unwrap(), spec, step, &mut detector, &mut table, |_, _, _, _| {});
     }
     let all = table["all"];
     assert!(all.seen >= 80, "{} people make no test", all.seen);
     assert!(all.recall() >= 0.6, "{} of {} people found:\n{table:#?}", all.found, all.seen);
-    // Neither may hide behind the other. In a crowd, many stand behind others; it counts in the sum only.
+    // Walking and sitting are checked separately. In a crowd many stand behind others; it counts in the sum only.
     for activity in ["walking", "sitting"] {
         let of = |name: &str| name.starts_with(activity) && !name.contains("crowd");
         let counts = table.iter().filter(|(name, _)| of(name)).map(|(_, count)| *count);

@@ -1,11 +1,11 @@
-//! What the synthetic world claims about itself, checked from outside: geometry, masks, boxes, repeatability.
+//! Checks the ground truth of the synthetic world: geometry, masks, boxes, repeatability.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 use nalgebra::Point3;
 use yfslam::Camera;
 use yfslam_synth::{CameraMotion, SceneKind, SensorConfig, SynthFrame, World, WorldConfig, parse};
 
-/// A small, noise-free world without baked shadows (they cost most of the set-up time).
+/// Returns a small, noise-free world without baked shadows, which take most of the set-up time.
 fn config(spec: &str) -> WorldConfig {
     let mut config = parse(&format!("{spec}&width=320&height=240")).unwrap();
     config.light.shadow_rays = 0;
@@ -26,14 +26,14 @@ fn same(a: &SynthFrame, b: &SynthFrame) -> bool {
         && a.t_world_cam == b.t_world_cam
 }
 
-/// The point of the world that pixel (x, y) of `shot` sees.
+/// Returns the point of the world at pixel (x, y) of `shot`.
 fn back_project(camera: &Camera, shot: &SynthFrame, x: usize, y: usize) -> Option<Point3<f64>> {
     let z = f64::from(*shot.exact_depth.get(x, y)?);
     let [nx, ny] = camera.undistort(x as f64, y as f64);
     (z > 0.0).then(|| shot.t_world_cam * Point3::new(nx * z, ny * z, z))
 }
 
-/// Depth of `shot` at a position between pixels, where the 4 × 4 pixels around it lie on one plane.
+/// Returns the depth of `shot` at a position between pixels, if the 4 × 4 pixels around it lie on one plane.
 fn depth_between(shot: &SynthFrame, u: f64, v: f64) -> Option<f64> {
     let (x, y) = (u.floor(), v.floor());
     if x < 1.0 || y < 1.0 {
@@ -59,7 +59,8 @@ fn depth_between(shot: &SynthFrame, u: f64, v: f64) -> Option<f64> {
     Some(1.0 / (top * (1.0 - fy) + bottom * fy))
 }
 
-/// Counts of compared pixels: that agree within a millimetre, that are hidden in the second frame, that look through.
+/// Returns the numbers of compared pixels: those that agree within a millimetre, that are hidden in the second frame, and that lie
+/// behind its surface.
 fn compare(camera: &Camera, a: &SynthFrame, b: &SynthFrame) -> (usize, usize, usize) {
     let (mut agree, mut hidden, mut through) = (0, 0, 0);
     for (x, y) in (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (x, y))) {
@@ -93,7 +94,7 @@ fn static_pixels_agree(config: &WorldConfig) {
             let (agree, hidden, through) = compare(&config.camera, a, b);
             assert!(agree > 10_000, "only {agree} pixels compared");
             assert!(hidden < agree / 5, "{hidden} hidden of {agree}");
-            assert_eq!(through, 0, "pixels see through what the other frame sees");
+            assert_eq!(through, 0, "pixels lie behind the surface of the other frame");
         }
     }
 }
@@ -112,7 +113,7 @@ fn exact_depth_agrees_through_a_distorting_lens_too() {
     static_pixels_agree(&config);
 }
 
-/// What the empty `scene` shows at three moments of every motion.
+/// Returns views of the empty `scene` at three moments of every motion.
 fn views_of(scene: &str) -> Vec<(WorldConfig, Vec<SynthFrame>)> {
     let shoot = |(motion, _): &(&str, CameraMotion)| {
         let config = config(&format!("sitting_xyz?seed=3&people=0&frames=1300&scene={scene}&motion={motion}"));
@@ -132,7 +133,7 @@ fn exact_depth_agrees_between_frames_in_every_scene_and_motion() {
                 let what = format!("{scene} {:?}, shots {a} and {b}: {agree}, {hidden}, {through}", config.motion);
                 assert!(agree > 8_000, "too few compared: {what}");
                 assert!(hidden < agree / 5, "too many hidden: {what}");
-                // A rod thinner than a pixel may be seen in one frame and missed in the other.
+                // A rod thinner than a pixel may be visible in one frame and missing in the other.
                 assert!(through * 1000 <= agree, "seen through: {what}");
             }
         }
@@ -140,7 +141,7 @@ fn exact_depth_agrees_between_frames_in_every_scene_and_motion() {
 }
 
 #[test]
-fn a_pose_that_is_wrong_by_three_millimetres_would_be_noticed() {
+fn a_pose_error_of_three_millimetres_would_be_detected() {
     let config = config("walking_xyz?seed=4&people=0");
     let world = World::new(&config).unwrap();
     let (a, mut b) = (world.frame(0), world.frame(40));
@@ -150,7 +151,7 @@ fn a_pose_that_is_wrong_by_three_millimetres_would_be_noticed() {
 }
 
 #[test]
-fn every_scene_is_closed_and_the_camera_keeps_clear_of_everything_on_its_way() {
+fn every_scene_is_closed_and_the_path_of_the_camera_is_free() {
     for (scene, _) in SceneKind::ALL {
         for motion in ["drive", "loop", "xyz", "halfsphere"] {
             let spec = format!("sitting_xyz?people=0&frames=1300&scene={scene}&motion={motion}&width=64&height=48");
@@ -167,7 +168,8 @@ fn every_scene_is_closed_and_the_camera_keeps_clear_of_everything_on_its_way() {
     }
 }
 
-/// First frame after which a tour passes its first pose again, its distance and angle from it, and the way until then.
+/// Returns the first frame after which a tour passes its first pose again, its distance and angle from it, and the length of the
+/// path until then.
 fn lap(world: &World) -> (usize, f64, f64, f64) {
     let first = world.pose(0);
     let away = |i: usize| first.inverse() * world.pose(i);
@@ -182,7 +184,7 @@ fn lap(world: &World) -> (usize, f64, f64, f64) {
 }
 
 #[test]
-fn a_loop_passes_its_start_again_looking_the_same_way() {
+fn a_loop_passes_its_start_again_in_the_same_direction() {
     for (scene, _) in SceneKind::ALL {
         for motion in ["loop", "drive"] {
             let world = world(&format!("sitting_xyz?people=0&frames=1300&shake=0&scene={scene}&motion={motion}"));
@@ -203,7 +205,7 @@ fn the_corridor_is_over_forty_metres_around_and_fits_into_1300_frames() {
 }
 
 #[test]
-fn flickering_light_changes_the_picture_and_nothing_else() {
+fn flickering_light_changes_the_image_and_nothing_else() {
     let bright = |shot: &SynthFrame| {
         shot.frame.color.data().iter().map(|p| f64::from(p[1])).sum::<f64>() / shot.frame.color.data().len() as f64
     };
@@ -220,7 +222,7 @@ fn flickering_light_changes_the_picture_and_nothing_else() {
 }
 
 #[test]
-fn people_are_exactly_what_differs_from_the_empty_world() {
+fn people_are_the_only_difference_to_the_empty_world() {
     let (full, empty) = (world("walking_xyz?seed=8&people=3&share=0.3"), world("walking_xyz?seed=8&people=0"));
     let mut seen = 0;
     for index in [0, 77, 160, 250] {
@@ -325,13 +327,13 @@ fn a_surface_keeps_its_colour_while_the_camera_moves() {
     }
     assert!(differences.len() > 20_000, "only {} pixels compared", differences.len());
     differences.sort_unstable();
-    // Half a pixel of rounding is in this figure.
+    // This includes half a pixel of rounding.
     let median = differences[differences.len() / 2];
     assert!(median <= 5, "median difference {median}");
 }
 
 #[test]
-fn people_cover_the_share_of_the_view_that_was_asked_for() {
+fn people_cover_the_requested_share_of_the_view() {
     for (people, wanted) in [(2, 0.1), (2, 0.2), (4, 0.3)] {
         let world = world(&format!("walking_xyz?seed=15&people={people}&share={wanted}"));
         let shares = (0..300).step_by(10).map(|i| {
@@ -351,7 +353,7 @@ fn timestamps_follow_the_frame_rate() {
     assert_eq!(times, [0, 33_333_333, 66_666_667, 100_000_000]);
 }
 
-/// Whether nine neighbours in a row on the circle of radius 3 are all brighter or all darker by 20 (FAST-9).
+/// Returns whether nine neighbours in a row on the circle of radius 3 are all brighter or all darker by 20 (FAST-9).
 fn is_corner(grey: &dyn Fn(usize, usize) -> i32, x: usize, y: usize) -> bool {
     const CIRCLE: [(i32, i32); 16] = [
         (0, -3),
@@ -377,7 +379,7 @@ fn is_corner(grey: &dyn Fn(usize, usize) -> i32, x: usize, y: usize) -> bool {
 }
 
 #[test]
-fn corners_abound_all_over_the_picture_at_several_scales() {
+fn corners_cover_the_image_at_several_scales() {
     for seed in [1, 2, 3, 16] {
         let mut config = config(&format!("walking_xyz?seed={seed}&people=0"));
         config.light.shadow_rays = 2;
@@ -396,7 +398,7 @@ fn corners_abound_all_over_the_picture_at_several_scales() {
                 rows[y * 6 / height][x * 8 / width] |= is_corner(&grey, x, y);
             }
             let filled = |rows: &[[bool; 8]]| rows.as_flattened().iter().filter(|&&filled| filled).count();
-            // The first row sees the ceiling, whose fine holes blur away at smaller sizes; the last one carpet and shadows.
+            // The first row shows the ceiling, whose fine holes are blurred at smaller sizes; the last one carpet and shadows.
             let (all, below) = (filled(&rows), filled(&rows[1..]));
             assert!(below >= 35, "seed {seed}: at 1/{shrink} of the size {below} of 40 cells have a corner: {rows:?}");
             assert!(shrink > 1 || all >= 40, "seed {seed}: at full size {all} of 48 cells have a corner: {rows:?}");
@@ -405,7 +407,7 @@ fn corners_abound_all_over_the_picture_at_several_scales() {
 }
 
 #[test]
-fn depth_that_lags_a_frame_behind_is_the_depth_of_the_next_frame_and_says_so() {
+fn depth_with_an_offset_of_one_frame_is_the_depth_of_the_next_frame_with_its_stamp() {
     let now = config("walking_xyz?seed=17&people=2&share=0.2");
     let mut lagging = now.clone();
     lagging.sensor.depth_offset_s = 1.0 / 30.0;
@@ -420,7 +422,7 @@ fn depth_that_lags_a_frame_behind_is_the_depth_of_the_next_frame_and_says_so() {
     assert!(differ < 20, "{differ} pixels differ");
 }
 
-/// Bilinear grey at a position between pixels.
+/// Returns the bilinear grey level at a position between pixels.
 fn grey_between(image: &yfslam::image::RgbImage, u: f64, y: usize) -> Option<f64> {
     let grey = |x: usize| Some(image.get(x, y)?.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0);
     let x = u.floor();
@@ -428,18 +430,18 @@ fn grey_between(image: &yfslam::image::RgbImage, u: f64, y: usize) -> Option<f64
 }
 
 #[test]
-fn a_point_lies_as_far_to_the_left_in_the_right_picture_as_baseline_and_depth_say() {
+fn a_point_in_the_right_image_is_shifted_by_the_disparity_of_baseline_and_depth() {
     let config = config("walking_xyz?people=1&stereo=0.11");
     let bf = 0.11 * config.camera.fx;
     let shot = World::new(&config).unwrap().frame(40);
     let right = shot.frame.right.as_ref().unwrap();
     assert!(shot.frame.depth.raw.data().iter().all(|&raw| raw == 0), "a stereo camera has no depth image");
-    // Sum of squared differences where the pictures are laid upon each other by the disparity and a bit more.
+    // Sum of squared differences of the images shifted against each other by the disparity and slightly more.
     let differ = |more: f64| {
         let (mut sum, mut count) = (0.0, 0);
         for y in 0..240 {
             for x in 60..319 {
-                // Only within surfaces: at their edges one camera sees what is hidden from the other.
+                // Only within surfaces: at their edges one camera may see a surface that is hidden from the other.
                 let Some(z) = depth_between(&shot, x as f64, y as f64) else { continue };
                 let there = grey_between(right, x as f64 - bf / z + more, y);
                 let Some((here, there)) = grey_between(&shot.frame.color, x as f64, y).zip(there) else { continue };

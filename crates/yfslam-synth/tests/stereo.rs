@@ -1,4 +1,4 @@
-//! How good the depths are that the core gets from rendered stereo pairs.
+//! Accuracy of the depths that the core computes from rendered stereo pairs.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 use yfslam::config::DepthSource;
@@ -6,7 +6,8 @@ use yfslam::dynamic::Method;
 use yfslam::{Config, Slam};
 use yfslam_synth::World;
 
-/// Errors of the disparities of all features on smooth surfaces, px of their level, and the share of features that have one.
+/// Returns the errors of the disparities of all features on smooth surfaces, px of their level, and the share of features that have
+/// one.
 fn disparity_errors(spec: &str, frames: impl Iterator<Item = usize>) -> (Vec<f64>, f64) {
     let world = World::new(&yfslam_synth::parse(spec).unwrap()).unwrap();
     let camera = &world.config().camera;
@@ -24,7 +25,7 @@ fn disparity_errors(spec: &str, frames: impl Iterator<Item = usize>) -> (Vec<f64
         for f in features {
             let Some(depth_m) = f.depth_m else { continue };
             let (x, y) = ((f.raw[0] + 0.5) as usize, (f.raw[1] + 0.5) as usize);
-            // The surfaces within two pixels: a corner on an edge may belong to any.
+            // The surfaces within two pixels: a corner on an edge may belong to any of them.
             let around =
                 (0..25).filter_map(|k| shot.exact_depth.get((x + k % 5).checked_sub(2)?, (y + k / 5).checked_sub(2)?));
             let error = |z: &f32| camera.bf / f64::from(depth_m) - camera.bf / f64::from(*z);
@@ -37,7 +38,7 @@ fn disparity_errors(spec: &str, frames: impl Iterator<Item = usize>) -> (Vec<f64
 }
 
 #[test]
-fn two_of_three_features_find_their_depth_to_a_tenth_of_a_pixel_of_their_level() {
+fn two_of_three_features_have_their_depth_to_a_tenth_of_a_pixel_of_their_level() {
     for spec in ["walking_xyz?people=1&stereo=0.11", "corridor_loop?people=0&stereo=0.11"] {
         let (errors, share) = disparity_errors(spec, (0..150).step_by(15));
         let mut absolute: Vec<f64> = errors.iter().map(|e| e.abs()).collect();

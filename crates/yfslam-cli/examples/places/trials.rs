@@ -120,7 +120,7 @@ impl<'a> Known<'a> {
             let begun = std::time::Instant::now();
             let tracked = slam.track(&delivery.frame)?;
             let elapsed_ns = delivery.frame.timestamp_ns - first_ns;
-            let covered = fault.strikes(elapsed_ns);
+            let covered = fault.affects(elapsed_ns);
             let reference = self.poses[film.frame_at(shown)];
             if tracked.t_world_cam.is_some_and(|pose| covered || self.is_wrong(shown, &tracked, &pose)) {
                 trial.wrong = true;

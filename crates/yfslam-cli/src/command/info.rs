@@ -54,7 +54,7 @@ fn recorded(args: &SourceArgs) -> Result<String> {
     {
         writeln!(text, "masks         {} of {} frames have one", masks.found, masks.found + masks.missing)?;
     }
-    match sequence.truth.path() {
+    match sequence.ground_truth.path() {
         Some(path) => truth(&mut text, path, &sequence)?,
         None => writeln!(text, "ground truth  none")?,
     }
@@ -71,7 +71,7 @@ fn sensor(depth_source: DepthSource) -> &'static str {
 }
 
 fn lists(text: &mut String, sequence: &Sequence) -> Result<()> {
-    let AssociationReport { color_listed, companions_listed, paired, .. } = &sequence.report;
+    let AssociationReport { color_listed, paired_images_listed, paired, .. } = &sequence.report;
     let report = &sequence.report;
     match (sequence.layout, sequence.depth_source) {
         _ if report.from_associations_file => {
@@ -81,14 +81,16 @@ fn lists(text: &mut String, sequence: &Sequence) -> Result<()> {
         (Layout::Tum, DepthSource::Image) => {
             writeln!(
                 text,
-                "lists         rgb.txt {color_listed}, depth.txt {companions_listed} images; {paired} pairs"
+                "lists         rgb.txt {color_listed}, depth.txt {paired_images_listed} images; {paired} pairs"
             )?;
         }
-        _ => writeln!(text, "lists         {color_listed} left, {companions_listed} right pictures; {paired} pairs")?,
+        _ => {
+            writeln!(text, "lists         {color_listed} left, {paired_images_listed} right pictures; {paired} pairs")?
+        }
     }
     for (count, what) in [
         (report.color_unmatched, "colour images without companion in time"),
-        (report.companions_unmatched, "companions without colour image in time"),
+        (report.paired_images_unmatched, "companions without colour image in time"),
         (report.duplicates_skipped, "entries skipped: duplicate stamp"),
         (report.backward_skipped, "entries skipped: stamp runs backward"),
         (report.unstamped_skipped, "entries skipped: no time stamp (nan)"),
@@ -173,13 +175,13 @@ fn open_images(entry: &FrameEntry, depth_source: DepthSource) -> Result<(RgbImag
     let read = |path: &Path| std::fs::read(path).map_err(|error| anyhow::anyhow!("{}: {error}", path.display()));
     let fault = |path: &Path, error| anyhow::anyhow!("{} {error}", path.display());
     decode_color(&read(&entry.color_path)?, None, &mut color).map_err(|e| fault(&entry.color_path, e))?;
-    let Some(companion) = &entry.companion else { return Ok((color, None)) };
-    let bytes = read(&companion.path)?;
+    let Some(paired) = &entry.paired_image else { return Ok((color, None)) };
+    let bytes = read(&paired.path)?;
     if depth_source == DepthSource::Image {
-        decode_depth(&bytes, None, &mut depth).map_err(|e| fault(&companion.path, e))?;
+        decode_depth(&bytes, None, &mut depth).map_err(|e| fault(&paired.path, e))?;
         return Ok((color, Some(depth)));
     }
-    decode_color(&bytes, None, &mut right).map_err(|e| fault(&companion.path, e))?;
+    decode_color(&bytes, None, &mut right).map_err(|e| fault(&paired.path, e))?;
     Ok((color, None))
 }
 
@@ -197,7 +199,7 @@ fn describe_camera(text: &mut String, source: &CameraSource) -> Result<()> {
 }
 
 fn truth(text: &mut String, path: &Path, sequence: &Sequence) -> Result<()> {
-    let poses = match sequence.truth.read(path) {
+    let poses = match sequence.ground_truth.read(path) {
         Ok(file) => file.poses,
         Err(error) => return Ok(writeln!(text, "ground truth  not usable: {error}")?),
     };

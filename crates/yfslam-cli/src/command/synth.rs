@@ -91,7 +91,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
         deliveries.par_iter().enumerate().try_for_each(|(k, d)| writer.write_images(number + k, &d.frame))?;
         for delivery in &deliveries {
             let stamp = delivery.has_stamp.then_some(delivery.frame.timestamp_ns);
-            writer.list(number, ListedStamps { color_ns: stamp, companion_ns: stamp.map(|ns| ns + offset_ns) });
+            writer.list(number, ListedStamps { color_ns: stamp, paired_ns: stamp.map(|ns| ns + offset_ns) });
             number += 1;
         }
         progress.frames(end, String::new);

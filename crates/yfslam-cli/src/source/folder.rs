@@ -46,7 +46,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
         frames: Frames::new(Player::Folder(stream, Box::new(known)), sequence.depth_source, args, &stamps_ns),
         stamps_ns,
         association: Some(sequence.report),
-        truth_reader: Some(sequence.truth),
+        truth_reader: Some(sequence.ground_truth),
         masks: tally,
         mirror: sequence.mirror,
     })
@@ -116,10 +116,10 @@ pub fn next(stream: &mut FrameStream, known: &FolderKnowledge, stages: &mut Stag
     let frame = stream.next()?;
     let after = stream.times();
     stages.push("decode color", after.color - before.color);
-    let companion = after.companion - before.companion;
-    match stream.companion() {
-        DepthSource::Image => stages.push("decode depth", companion),
-        DepthSource::Stereo => stages.push("decode right", companion),
+    let paired = after.paired_image - before.paired_image;
+    match stream.depth_source() {
+        DepthSource::Image => stages.push("decode depth", paired),
+        DepthSource::Stereo => stages.push("decode right", paired),
         DepthSource::Motion => {}
     }
     stages.push("decode wait", after.waited - before.waited);

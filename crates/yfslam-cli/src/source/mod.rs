@@ -14,7 +14,7 @@ use yfslam::RgbdFrame;
 use yfslam::config::DepthSource;
 use yfslam_eval::StampedPose;
 use yfslam_io::boxes::{BOXES_FILE, KnownDetections};
-use yfslam_io::sequence::{AssociationReport, TruthReader};
+use yfslam_io::sequence::{AssociationReport, GroundTruthReader};
 use yfslam_io::time::{TimeMirror, format_stamp};
 use yfslam_io::trajectory::mirror_trajectory;
 use yfslam_io::{CameraSource, Delivery, Fault, FaultInjector, FrameStream, TrajectoryFile, load_camera};
@@ -98,7 +98,7 @@ pub struct Source {
     /// Which frames have a mask, where masks were asked for.
     pub masks: Option<MaskTally>,
     /// Reads ground truth in the format of the folder; `None` for synthetic worlds.
-    pub truth_reader: Option<TruthReader>,
+    pub truth_reader: Option<GroundTruthReader>,
     /// Set when the sequence is played backward.
     pub mirror: Option<TimeMirror>,
 }
@@ -305,7 +305,7 @@ impl Source {
         let path = match (file, self.truth_of_world()) {
             (None, Some(truth)) => return Ok(Some(truth)),
             (Some(file), _) => file,
-            (None, None) => match reader.and_then(TruthReader::path) {
+            (None, None) => match reader.and_then(GroundTruthReader::path) {
                 Some(path) => path,
                 None => return Ok(None),
             },

@@ -1,11 +1,11 @@
-//! How a YOLO network lays its boxes out: raw output in, candidates in px of the network input out.
+//! Layouts of the output of YOLO networks. In: raw output. Out: candidates in px of the network input.
 
 use yfslam::{BoundingBox, Detection};
 
-/// Where suppression is part of the network, it gives no more boxes than this.
+/// Largest number of boxes of a network that includes suppression.
 const MOST_FINAL: usize = 1000;
 
-/// What the numbers of the first output are.
+/// Layout of the first output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Layout {
     /// `[1, 4 + classes, n]`: centre, size, score of each class; versions 8 to 12.
@@ -17,8 +17,8 @@ pub(super) enum Layout {
 }
 
 impl Layout {
-    /// The layout of a network with outputs of these shapes. Coefficients of masks, of which a second output `[1, masks, height, width]`
-    /// tells the number, follow the rest.
+    /// Finds the layout of a network with outputs of these shapes. Mask coefficients come last; a second output `[1, masks, height,
+    /// width]` gives their number.
     pub(super) fn find(shapes: &[Vec<usize>]) -> Result<Self, String> {
         let masks = shapes.iter().skip(1).find(|shape| shape.len() == 4).map_or(0, |shape| shape[1]);
         let layout = match shapes.first().map(Vec::as_slice) {
@@ -39,7 +39,7 @@ impl Layout {
         })
     }
 
-    /// Number of classes, where the output tells it.
+    /// Returns the number of classes, if the output contains it.
     pub(super) fn classes(self) -> Option<usize> {
         match self {
             Self::Columns { classes } | Self::Rows { classes } => Some(classes),
@@ -47,8 +47,8 @@ impl Layout {
         }
     }
 
-    /// Appends every box whose score exceeds `threshold`, px of the network input, to `out`, with its number. `values` are those of an
-    /// output of `shape`.
+    /// Appends every box whose score exceeds `threshold`, px of the network input, to `out`, with its number. `values` are those of
+    /// an output of `shape`.
     pub(super) fn candidates(self, shape: &[usize], values: &[f32], threshold: f32, out: &mut Vec<(Detection, usize)>) {
         let &[_, rows, columns] = shape else { return };
         let at = |row: usize, column: usize| values.get(row * columns + column).copied().unwrap_or_default();
@@ -79,7 +79,7 @@ impl Layout {
         }
     }
 
-    /// What follows the classes of box `n`, `masks` numbers: its coefficients.
+    /// Returns the `masks` coefficients of box `n`, which follow its classes.
     pub(super) fn coefficients(self, shape: &[usize], values: &[f32], n: usize, masks: usize) -> Vec<f32> {
         let &[_, _, columns] = shape else { return Vec::new() };
         let at = |row: usize, column: usize| values.get(row * columns + column).copied().unwrap_or_default();
@@ -92,7 +92,7 @@ impl Layout {
     }
 }
 
-/// The highest score and its class.
+/// Returns the highest score and its class.
 fn best(scores: impl Iterator<Item = f32>) -> (usize, f32) {
     scores
         .enumerate()
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn layouts_are_told_by_their_shapes() {
+    fn layouts_are_found_by_their_shapes() {
         let find = |shapes: &[&[usize]]| Layout::find(&shapes.iter().map(|shape| shape.to_vec()).collect::<Vec<_>>());
         assert_eq!(find(&[&[1, 84, 8400]]), Ok(Layout::Columns { classes: 80 }));
         assert_eq!(find(&[&[1, 116, 8400], &[1, 32, 160, 160]]), Ok(Layout::Columns { classes: 80 }));

@@ -1,15 +1,15 @@
-//! Image in, network input out: as large as fits without distortion, in the middle, on grey.
+//! Converts an image to the network input: as large as possible without distortion, in the middle of a grey input.
 
 use fearless_simd::Level;
 use yfslam::BoundingBox;
 use yfslam::image::RgbImage;
 
-use crate::preprocess::Stretch;
+use crate::yolo::preprocess::Stretch;
 
-/// What these networks are trained to see beside an image.
+/// Grey level of the margins, as in the training of these networks.
 const GREY: f32 = 114.0 / 255.0;
 
-/// The network input, and where in it the image lies.
+/// The network input, and the place of the image in it.
 #[derive(Debug)]
 pub(super) struct Letterbox {
     /// Height and width, px.
@@ -21,7 +21,7 @@ pub(super) struct Letterbox {
     inner: Vec<f32>,
     /// Left and top edge of the image in the input, px.
     offset: [usize; 2],
-    /// Pixels of the input for one of the image.
+    /// Pixels of the input per pixel of the image.
     scale: [f32; 2],
 }
 
@@ -55,12 +55,12 @@ impl Letterbox {
         }
     }
 
-    /// A position in the image that was put there last as one in the input, px.
+    /// Converts a position in the last image to one in the input, px.
     pub(super) fn to_input(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         [x * self.scale[0] + self.offset[0] as f32, y * self.scale[1] + self.offset[1] as f32]
     }
 
-    /// A box in the input as one in the image that was put there last, whose sides are given; cut off at its edges.
+    /// Converts a box in the input to one in the last image, whose sides are given, and clips it at the edges.
     pub(super) fn to_image(&self, bbox: BoundingBox, [width, height]: [usize; 2]) -> BoundingBox {
         let x = |x: f32| ((x - self.offset[0] as f32) / self.scale[0]).clamp(0.0, width as f32);
         let y = |y: f32| ((y - self.offset[1] as f32) / self.scale[1]).clamp(0.0, height as f32);
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_image_lies_in_the_middle_undistorted_on_grey_and_boxes_find_back() {
+    fn an_image_is_centred_without_distortion_on_grey_and_boxes_are_converted_back() {
         for (width, height, offset, inside) in
             [(80, 40, [0, 16], 64 * 32), (40, 80, [16, 0], 32 * 64), (10, 10, [0, 0], 64 * 64)]
         {

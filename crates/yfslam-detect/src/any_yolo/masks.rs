@@ -1,7 +1,7 @@
-//! Masks of a network that segments (Bolya et al., YOLACT, ICCV 2019, section 3.2): each object's is a sum of prototypes that all share,
-//! weighed by the object's own coefficients and cut at its box.
+//! Masks of a network that segments (Bolya et al., YOLACT, ICCV 2019, section 3.2): the mask of an object is a sum of common
+//! prototypes, weighted by the coefficients of the object and clipped at its box.
 //!
-//! In: prototypes, coefficients, boxes. Out: the object, and the class, that each pixel of the image shows.
+//! In: prototypes, coefficients, boxes. Out: the object and the class of each pixel.
 
 use yfslam::image::Image;
 use yfslam::{BoundingBox, Detection};
@@ -16,7 +16,7 @@ pub(super) struct Prototypes<'a> {
 }
 
 impl Prototypes<'_> {
-    /// Marks the pixels of an object within its box, found in the image that `letterbox` holds; those of former objects are kept.
+    /// Marks the pixels of an object within its box in the image of `letterbox`; pixels of earlier objects are kept.
     pub(super) fn draw(
         self,
         coefficients: &[f32],
@@ -41,7 +41,7 @@ impl Prototypes<'_> {
         }
     }
 
-    /// The weighed sum at a position, px of the prototypes, bilinear; above 0 the object is more likely there than not.
+    /// Returns the weighted sum at a position, px of the prototypes, bilinear; above 0 the object is probable.
     fn sum(self, coefficients: &[f32], [x, y]: [f32; 2]) -> f32 {
         let [_, height, width] = self.shape;
         let (x, y) = (x.clamp(0.0, width as f32 - 1.0), y.clamp(0.0, height as f32 - 1.0));
@@ -57,10 +57,10 @@ impl Prototypes<'_> {
     }
 }
 
-/// The classes of objects that are marked as 1 + their place in `found`, as 1 + class; 0 for a class that a mask cannot tell.
-pub(super) fn classes(objects: &Image<u16>, found: &[Detection]) -> Image<u8> {
+/// Converts marks, 1 + the index in `detections`, to 1 + class; 0 for a class that does not fit a mask.
+pub(super) fn classes(objects: &Image<u16>, detections: &[Detection]) -> Image<u8> {
     let values: Vec<u8> = std::iter::once(0)
-        .chain(found.iter().map(|object| u8::try_from(object.class + 1).unwrap_or_default()))
+        .chain(detections.iter().map(|object| u8::try_from(object.class + 1).unwrap_or_default()))
         .collect();
     let mut mask = Image::new(objects.width(), objects.height());
     for (pixel, mark) in mask.data_mut().iter_mut().zip(objects.data()) {

@@ -1,6 +1,8 @@
-//! YOLO networks of other architectures: an ONNX file for `rten` and an image in, boxes out, and masks from a network that segments.
+//! YOLO networks of other architectures with the runtime `rten`. In: an ONNX file and images. Out: detections, and masks from a
+//! network that segments.
 //!
-//! Red, green, blue in [0, 1], the image made to fit with grey margins; boxes in one of three [`Layout`]s.
+//! The input is red, green, blue in [0, 1], with grey margins where the shape of the image differs; the output is one of three
+//! [`Layout`]s.
 
 mod layout;
 mod letterbox;
@@ -14,19 +16,21 @@ use rten_tensor::{NdTensorView, TensorView};
 use yfslam::image::{Image, RgbImage};
 use yfslam::{Detection, Detector, DetectorError};
 
-use crate::decode::suppress;
-use crate::onnx::Model;
-use crate::yolo::{check, class_names, parse_names};
-use crate::{DetectorConfig, ModelError, Network};
+use crate::config::DetectorConfig;
+use crate::engine::onnx::Model;
+use crate::error::ModelError;
+use crate::network::Network;
+use crate::yolo::decode::suppress;
+use crate::yolo::metadata::{class_names, parse_names};
 use layout::Layout;
 use letterbox::Letterbox;
 use masks::Prototypes;
 
-/// Sides of an input that a network may have, px.
+/// Allowed sides of the network input, px.
 const SIDES: std::ops::RangeInclusive<usize> = 32..=4096;
 
-/// A YOLO network of any architecture that `rten` can run, on all cores: versions 5 to 12 and 26 as their training code exports them to
-/// ONNX, with a fixed size of the input and floats of 32 bits. It allocates while it runs.
+/// A YOLO network of any architecture that `rten` supports, on all cores: versions 5 to 12 and 26, exported to ONNX by their
+/// training code with a fixed input size and 32-bit floats. It allocates while it runs.
 ///
 /// ```no_run
 /// use yfslam::Detector;
@@ -35,8 +39,8 @@ const SIDES: std::ops::RangeInclusive<usize> = 32..=4096;
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let image = yfslam::image::RgbImage::new(640, 480);
 /// let mut detector = AnyYolo::from_bytes("yolo.onnx", &std::fs::read("yolo.onnx")?, &DetectorConfig::default())?;
-/// let mut found = Vec::new();
-/// detector.detect(&image, &mut found)?;
+/// let mut detections = Vec::new();
+/// detector.detect(&image, &mut detections)?;
 /// # Ok(()) }
 /// ```
 pub struct AnyYolo {
@@ -46,21 +50,21 @@ pub struct AnyYolo {
     config: DetectorConfig,
     class_names: Vec<String>,
     candidates: Vec<(Detection, usize)>,
-    /// Which object each pixel of the last image shows, and which class, if the network segments.
+    /// The object of each pixel of the last image, and its class, if the network segments.
     objects: Option<Image<u16>>,
     mask: Option<Image<u8>>,
 }
 
 impl AnyYolo {
-    /// Reads the contents of an ONNX file, and tries the network once; `name` is what errors call it.
+    /// Loads a network from the contents of an ONNX file and runs it once; `name` stands for the file in error messages.
     ///
     /// # Errors
-    /// If it is no ONNX model, `rten` cannot run it, its input or output is not as expected, or it does not fit `config`.
+    /// The file is not an ONNX model, `rten` cannot run it, its input or output has another form, or it does not fit `config`.
     pub fn from_bytes(name: &str, bytes: &[u8], config: &DetectorConfig) -> Result<Self, ModelError> {
         let mismatch = |what: String| ModelError::Mismatch { model: name.into(), what };
-        check(config).map_err(mismatch)?;
+        config.check().map_err(mismatch)?;
         if config.integers {
-            return Err(mismatch("integers are for YOLO-FastestV2 alone (`integers`); this is another network".into()));
+            return Err(mismatch("integers are supported for YOLO-FastestV2 only (`integers`), and this is another network; set it to false".into()));
         }
         let model = Model::parse(bytes).map_err(|error| ModelError::NotOnnx { model: name.into(), what: error.0 })?;
         let (height, width) = input_size(&model).map_err(mismatch)?;
@@ -70,7 +74,7 @@ impl AnyYolo {
         let outputs = run(&runtime, &letterbox).map_err(|what| mismatch(format!("rten cannot run it: {what}")))?;
         let shapes: Vec<Vec<usize>> = outputs.iter().map(|output| output.shape().to_vec()).collect();
         let layout = Layout::find(&shapes).map_err(mismatch)?;
-        // Where classes are numbers in the output, names alone tell how many there are.
+        // Where classes are numbers in the output, only the names give their count.
         let classes = layout.classes().unwrap_or_else(|| match config.class_names.len() {
             0 => model.metadata.get("names").map_or(0, |text| parse_names(text).len()),
             given => given,
@@ -98,7 +102,7 @@ impl Detector for AnyYolo {
             .ok_or_else(|| DetectorError("the network's first output holds no floats".into()))?;
         self.candidates.clear();
         self.layout.candidates(&shape, &values, self.config.score_threshold, &mut self.candidates);
-        // What suppression leaves of boxes that were suppressed already is all of them.
+        // Boxes that were suppressed already are all kept.
         let iou_threshold = if self.layout == Layout::Final { 1.0 } else { self.config.iou_threshold };
         let mut boxes: Vec<Detection> = self.candidates.iter().map(|(found, _)| *found).collect();
         suppress(&mut boxes, &DetectorConfig { iou_threshold, ..DetectorConfig::default() }, out);
@@ -109,7 +113,7 @@ impl Detector for AnyYolo {
         let mut kept = out.iter().map(is_kept);
         numbers.retain(|_| kept.next().unwrap_or_default());
         out.retain(is_kept);
-        // Prototypes are all there is with four dimensions.
+        // Only prototypes have four dimensions.
         let prototypes = outputs.iter().skip(1).filter_map(|o| floats(Some(o))).find(|(shape, _)| shape.len() == 4);
         self.objects = prototypes.map(|(whole, prototypes)| {
             let prototypes = Prototypes { values: &prototypes, shape: [whole[1], whole[2], whole[3]] };
@@ -135,13 +139,13 @@ impl Network for AnyYolo {
     }
 }
 
-/// Shape and values of an output.
+/// Returns the shape and values of an output.
 fn floats(output: Option<&Value>) -> Option<(Vec<usize>, Vec<f32>)> {
     let output: TensorView<f32> = output?.try_into().ok()?;
     Some((output.shape().to_vec(), output.to_vec()))
 }
 
-/// Height and width of the only input.
+/// Returns the height and width of the only input.
 fn input_size(model: &Model) -> Result<(usize, usize), String> {
     let inputs: Vec<_> = model.inputs.iter().filter(|info| !model.initializers.contains_key(info.name)).collect();
     match inputs.as_slice() {
@@ -157,7 +161,7 @@ fn input_size(model: &Model) -> Result<(usize, usize), String> {
     }
 }
 
-/// The outputs for the image that was put into `letterbox` last.
+/// Runs the network on the image that was put into `letterbox` last.
 fn run(runtime: &Runtime, letterbox: &Letterbox) -> Result<Vec<Value>, String> {
     let (height, width) = letterbox.size;
     let view = NdTensorView::from_data([1, 3, height, width], &letterbox.input[..]);

@@ -1,4 +1,4 @@
-//! A YOLO-FastestV2 network with random weights, made on the spot: as ONNX bytes, and run by a naive executor.
+//! A YOLO-FastestV2 network with random weights, generated as ONNX bytes and run by a naive executor.
 #![allow(
     dead_code,
     clippy::unwrap_used,
@@ -12,7 +12,7 @@ mod reference;
 
 use std::collections::BTreeMap;
 
-/// How a graph spells what can be spelled in several ways.
+/// Form of a graph, where several are possible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     /// Batch norm folded, shuffle by 5-D reshape and gather.
@@ -49,7 +49,7 @@ pub enum Constant {
     Ints(Vec<usize>, Vec<i64>),
 }
 
-/// A network in the making.
+/// A network that is being built.
 pub struct Net {
     pub height: usize,
     pub width: usize,
@@ -79,13 +79,13 @@ pub struct Size {
 }
 
 impl Net {
-    /// A network without nodes; its input is called `image`.
+    /// Creates a network without nodes; its input is called `image`.
     pub fn empty(height: usize, width: usize) -> Self {
         let (nodes, constants, outputs, metadata) = Default::default();
         Net { height, width, nodes, constants, outputs, metadata, style: Style::Folded, random: 0 }
     }
 
-    /// The whole architecture.
+    /// Creates the whole architecture.
     pub fn yolo(size: &Size, style: Style, seed: u64) -> Self {
         let &Size { height, width, channels, classes } = size;
         let mut net = Net { style, random: seed, ..Net::empty(height, width) };
@@ -134,12 +134,12 @@ impl Net {
         net
     }
 
-    /// Cuts the weights to 11 significant bits; with `store`, also writes them as floats of 16 bits, each with a cast to 32.
+    /// Truncates the weights to 11 significant bits; with `store`, also writes them as 16-bit floats, each with a cast to 32 bits.
     pub fn halve(&mut self, store: bool) {
         let mut stored = BTreeMap::new();
         for (name, constant) in &mut self.constants {
             let Constant::Floats(dims, values) = constant else { continue };
-            // What lies outside of the range of 16 bits becomes 0.
+            // Values outside the range of 16 bits become 0.
             let kept = |value: f32| (6.2e-5..6.5e4).contains(&value.abs());
             let cut = |value: f32| if kept(value) { value.to_bits() & !0x1fff } else { 0 };
             let half = |bits: u32| {
@@ -240,7 +240,7 @@ impl Net {
         self.node("Concat", parts, "concat", vec![("axis", Attribute::Int(1))])
     }
 
-    /// First unit of a stage: two branches, both of stride 2.
+    /// Adds the first unit of a stage: two branches, both of stride 2.
     fn downsample(&mut self, x: &str, from: usize, half: usize) -> String {
         let left = self.conv(x, (from, from), 3, 2, from);
         let left = self.pointwise_relu(&left, from, half);
@@ -250,7 +250,7 @@ impl Net {
         self.concat(&[&left, &right])
     }
 
-    /// Further units: even channels pass, odd ones are convolved.
+    /// Adds a further unit: even channels pass, odd ones are convolved.
     fn unit(&mut self, x: &str, half: usize, side: (usize, usize)) -> String {
         let (left, right) = self.shuffle(x, half, side);
         let right = self.pointwise_relu(&right, half, half);
@@ -312,7 +312,7 @@ impl Net {
         )
     }
 
-    /// Two rounds of depthwise 5×5, ReLU, pointwise.
+    /// Adds a head: twice depthwise 5×5, ReLU, pointwise.
     fn head(&mut self, x: &str, channels: usize) -> String {
         let mut x = x.to_owned();
         for _ in 0..2 {

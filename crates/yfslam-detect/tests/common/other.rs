@@ -1,12 +1,12 @@
-//! YOLO networks of other architectures: what they see is red, green and blue, each a class whose score is the share of
-//! that colour in the input; where they see it is fixed.
+//! YOLO networks of other architectures. Their classes are red, green and blue, with the share of that colour in the input as
+//! score; their boxes are fixed.
 
 use super::{Attribute, Constant, Net};
 
-/// Boxes of the networks, far more than values for each, as is usual.
+/// Number of boxes, which exceeds the number of values per box, as usual.
 pub const BOXES: usize = 12;
 
-/// A network whose boxes lie 10 px apart, at the left of an input of 160 × 96 px.
+/// Returns a network whose boxes lie 10 px apart, at the left of an input of 160 × 96 px.
 pub fn net(layout: &str) -> Net {
     let mut net = Net::empty(96, 160);
     net.metadata = vec![("names", "{0: 'red', 1: 'green', 2: 'blue'}".into())];
@@ -31,7 +31,7 @@ pub fn net(layout: &str) -> Net {
     let (output, shape) = match layout {
         "columns" => (columns, vec![1, 7, BOXES]),
         "rows" => (net.node("Transpose", &[&columns], "rows", turned), vec![1, BOXES, 8]),
-        // Left, top, right, bottom, score, class; the score of the second box falls with the image's red.
+        // Left, top, right, bottom, score, class; the score of the second box falls with the red of the image.
         _ => {
             let fixed =
                 [[4.0, 10.0, 14.0, 30.0, 0.9, 2.0], [5.0, 10.0, 15.0, 30.0, 0.4, 2.0], [0.0, 0.0, 9.0, 9.0, 0.8, 7.0]];
@@ -45,8 +45,8 @@ pub fn net(layout: &str) -> Net {
     net
 }
 
-/// The same in columns, with masks: of two prototypes the first is positive above the middle of the input, the second below; boxes with
-/// an even number show what is above, the others what is below.
+/// Returns the same network in columns, with masks: of two prototypes the first is positive above the middle of the input, the
+/// second below; boxes with an even number have the upper one, the others the lower one.
 pub fn net_with_masks() -> Net {
     let mut net = net("columns");
     let number = |values: &[usize], data| Constant::Floats(values.to_vec(), data);

@@ -1,4 +1,4 @@
-//! Runs a network node by node in double precision, as the ONNX operator documentation defines each, without any cleverness.
+//! Runs a network node by node in double precision, following the definitions of the ONNX operators literally.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +11,13 @@ struct Tensor {
 }
 
 impl Net {
-    /// The outputs for an input of `3 × height × width`.
+    /// Returns the outputs for an input of `3 × height × width`.
     pub fn run(&self, image: &[f32]) -> Vec<Vec<f64>> {
         let values = self.values(image);
         self.outputs.iter().map(|(name, dims)| (&values[name], dims)).map(|(value, dims)| value.checked(dims)).collect()
     }
 
-    /// For each 1×1 convolution its name, and the least and the largest value that it reads.
+    /// Returns, for each 1×1 convolution, its name and the least and the largest value of its input.
     #[allow(dead_code, reason = "each test uses what it needs")]
     pub fn ranges<'a>(&'a self, image: &[f32]) -> Vec<(&'a str, f64, f64)> {
         let values = self.values(image);
@@ -57,7 +57,7 @@ impl Tensor {
         self.data.clone()
     }
 
-    /// Element `position` of each axis gives.
+    /// Builds a tensor whose elements are those of `self` at the positions that `source` returns.
     fn pick(&self, dims: Vec<usize>, source: impl Fn(&[usize]) -> Vec<usize>) -> Self {
         let mut data = Vec::new();
         for flat in 0..dims.iter().product() {
@@ -73,7 +73,7 @@ impl Tensor {
         Self { dims, data }
     }
 
-    /// Pixel of plane `plane`; 0 outside.
+    /// Returns a pixel of plane `plane`; `None` outside.
     fn at(&self, plane: usize, y: isize, x: isize) -> Option<f64> {
         let (height, width) = (self.dims[2] as isize, self.dims[3] as isize);
         let inside = (0..height).contains(&y) && (0..width).contains(&x);
@@ -184,7 +184,7 @@ impl Node {
     }
 }
 
-/// A tensor whose elements are computed from their position.
+/// Builds a tensor whose elements are computed from their position.
 fn each(dims: Vec<usize>, value: impl Fn(&[usize]) -> f64) -> Tensor {
     let mut data = Vec::new();
     for channel in 0..dims[1] {

@@ -1,4 +1,4 @@
-//! Refuses values that no camera has, before they turn into a trajectory of nonsense.
+//! Refuses calibrations that no camera can have, before a trajectory is computed from them.
 
 use yfslam::Camera;
 
@@ -7,14 +7,14 @@ use crate::error::{Error, Result};
 /// Largest side of an image, px.
 const MAX_SIDE: usize = 16_384;
 
-/// Largest error of undistorting and distorting a point again, px. Beyond it the distortion folds the image over.
+/// Largest error after undistorting and distorting a point, px. Above it the distortion cannot be inverted.
 const MAX_ROUND_TRIP_PX: f64 = 0.5;
 
-/// Checks that `camera`, which came from `origin`, can be a camera.
+/// Checks the calibration `camera`; `origin` names its source in error messages.
 ///
 /// # Errors
-/// The first value out of range: sizes, focal lengths, depth factor, rate and `bf` must be positive and finite, and the distortion
-/// must be invertible up to the border of the image.
+/// A value is out of range: sizes, focal lengths, depth factor, rate and `bf` must be positive and finite, and the distortion must be
+/// invertible up to the border of the image.
 pub fn check_camera(camera: &Camera, origin: &str) -> Result<()> {
     let refuse = |problem: String, cure: &str| Err(Error::argument(format!("camera {origin}: {problem}"), cure));
     for (name, side) in [("width", camera.width), ("height", camera.height)] {
@@ -36,7 +36,7 @@ pub fn check_camera(camera: &Camera, origin: &str) -> Result<()> {
     }
     let others = [camera.cx, camera.cy].into_iter().chain(camera.distortion);
     if let Some(value) = others.into_iter().find(|value| !value.is_finite()) {
-        return refuse(format!("principal point or distortion holds {value}"), "calibrate the camera again");
+        return refuse(format!("the principal point or the distortion contains {value}"), "calibrate the camera again");
     }
     check_distortion(camera).or_else(|(u, v)| {
         let problem = format!("distortion {:?} folds the image at pixel ({u:.0}, {v:.0})", camera.distortion);
@@ -44,7 +44,7 @@ pub fn check_camera(camera: &Camera, origin: &str) -> Result<()> {
     })
 }
 
-/// Undistorts corners and edge centres and distorts them again; the pixel at which that fails.
+/// Undistorts and distorts the corners and edge centres; returns the first pixel at which this fails.
 fn check_distortion(camera: &Camera) -> std::result::Result<(), (f64, f64)> {
     let (right, bottom) = ((camera.width - 1) as f64, (camera.height - 1) as f64);
     for u in [0.0, right / 2.0, right] {

@@ -1,4 +1,4 @@
-//! Where the camera comes from: a preset, a settings file in the style of ORB-SLAM2 and 3, or our own TOML.
+//! Loads a camera calibration from a preset, a settings file in the style of ORB-SLAM2 and 3, or a TOML file.
 
 mod check;
 mod opencv;
@@ -14,24 +14,24 @@ pub use check::check_camera;
 pub use opencv::parse_opencv_settings;
 pub use presets::{PRESETS, preset};
 
-/// Camera files looked for in a sequence folder, in this order.
+/// Names of camera files in a sequence folder, in the order in which they are tried.
 const CAMERA_FILES: [&str; 3] = ["camera.toml", "camera.yaml", "camera.yml"];
 
-/// A checked camera and where it came from.
+/// A checked camera calibration and its origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraSource {
     /// The calibration.
     pub camera: Camera,
-    /// The preset or file, for people.
+    /// The preset or file, for display.
     pub origin: String,
-    /// Keys of the file that say nothing about the camera and were not used.
+    /// Keys of the file that were not used.
     pub unused_keys: Vec<String>,
 }
 
-/// Loads the preset or file that `spec` names; a relative path is tried as it is, then inside the folder `near`.
+/// Loads the preset or file named `spec`; a relative path is tried as it is, then inside the folder `near`.
 ///
 /// # Errors
-/// An unknown name, an unreadable or malformed file, a missing key, or values that no camera has.
+/// The name is unknown, the file is unreadable or malformed, a key is missing, or a value is out of range.
 pub fn load_camera(spec: &str, near: Option<&Path>) -> Result<CameraSource> {
     let candidates = [Some(PathBuf::from(spec)), near.map(|folder| folder.join(spec))];
     if let Some(path) = candidates.into_iter().flatten().find(|path| path.is_file()) {
@@ -51,15 +51,15 @@ pub fn load_camera(spec: &str, near: Option<&Path>) -> Result<CameraSource> {
     }
 }
 
-/// Looks for `camera.toml`, `camera.yaml` or `camera.yml` in a sequence folder.
+/// Loads `camera.toml`, `camera.yaml` or `camera.yml` from a sequence folder.
 ///
 /// # Errors
-/// None is there, or as for [`load_camera`].
+/// None of them exists, or as for [`load_camera`].
 pub fn detect_camera(folder: &Path) -> Result<CameraSource> {
     match CAMERA_FILES.iter().map(|name| folder.join(name)).find(|path| path.is_file()) {
         Some(path) => load_file(&path),
         None => {
-            let problem = format!("holds no camera file ({})", CAMERA_FILES.join(", "));
+            let problem = format!("contains no camera file ({})", CAMERA_FILES.join(", "));
             Err(Error::content(folder, problem, format!("give --camera with a file or one of {}", PRESETS.join(", "))))
         }
     }
@@ -76,7 +76,7 @@ fn load_file(path: &Path) -> Result<CameraSource> {
     Ok(source)
 }
 
-/// Parses our own TOML: the fields of [`Camera`], unknown keys refused.
+/// Parses the fields of [`Camera`] from TOML and refuses unknown keys.
 ///
 /// # Errors
 /// A syntax error, a missing or an unknown key, with its line.
@@ -84,7 +84,7 @@ pub fn parse_toml(text: &str, path: &Path) -> Result<CameraSource> {
     let camera = toml::from_str(text).map_err(|error| {
         let start = error.span().map_or(0, |span| span.start);
         let line = 1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count();
-        let cure = "keys are width, height, fx, fy, cx, cy, depth_factor and, if you like, distortion, fps, bf";
+        let cure = "the keys are width, height, fx, fy, cx, cy, depth_factor and, optionally, distortion, fps, bf";
         Error::line(path, line, error.message(), cure)
     })?;
     Ok(CameraSource { camera, origin: path.display().to_string(), unused_keys: vec![] })

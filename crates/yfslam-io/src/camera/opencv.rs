@@ -1,7 +1,7 @@
 //! OpenCV settings files in the style of ORB-SLAM2 (`Camera.fx: 517.3`) and ORB-SLAM3 (`Camera1.fx`, `RGBD.DepthMapFactor`).
 //!
-//! They are not YAML 1.2 (`%YAML:1.0`, `Viewer.PointSize:2`), so this reads them line by line: `key: value`, comments, quotes,
-//! indented keys below a parent, and lists in brackets, which are passed over.
+//! They are not YAML 1.2 (`%YAML:1.0`, `Viewer.PointSize:2`), so they are read line by line: `key: value`, comments, quotes, indented
+//! keys below a parent key, and lists in brackets, which are skipped.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,11 +16,11 @@ type Settings<'a> = BTreeMap<String, (&'a str, usize)>;
 
 /// Parses a settings file.
 ///
-/// Size, `fx fy cx cy` and the depth factor must be there; distortion defaults to 0, `fps` to 30 and `bf` to 40. Keys that do not
-/// describe the camera are listed as unused.
+/// Size, `fx fy cx cy` and the depth factor are required; distortion defaults to 0, `fps` to 30 and `bf` to 40. All other keys are
+/// listed as unused.
 ///
 /// # Errors
-/// A line that is no `key: value`, a key given twice, a missing key, a value that is no number, or a fisheye camera.
+/// A line is not `key: value`, a key is given twice or is missing, a value is not a number, or the camera is a fisheye camera.
 pub fn parse_opencv_settings(text: &str, path: &Path) -> Result<CameraSource> {
     let mut settings = Reader { settings: read_settings(text, path)?, path };
     settings.refuse_fisheye()?;
@@ -49,14 +49,14 @@ pub fn parse_opencv_settings(text: &str, path: &Path) -> Result<CameraSource> {
     Ok(CameraSource { camera, origin: path.display().to_string(), unused_keys })
 }
 
-/// Takes known keys out of the settings; what is left is unused.
+/// Removes known keys from the settings; the remaining ones are unused.
 struct Reader<'a> {
     settings: Settings<'a>,
     path: &'a Path,
 }
 
 impl Reader<'_> {
-    /// The first of `keys` that is there, as a finite number.
+    /// Returns the first of `keys` that is given, as a finite number.
     fn optional(&mut self, keys: &[&str]) -> Result<Option<f64>> {
         let Some((key, (value, line))) = keys.iter().find_map(|&key| Some((key, self.settings.remove(key)?))) else {
             return Ok(None);
@@ -95,7 +95,7 @@ impl Reader<'_> {
             "DepthMapFactor" => "add the depth units per metre, such as 'DepthMapFactor: 5000.0'".to_owned(),
             _ => format!("add a line '{key}: …' from the calibration of the camera"),
         };
-        Error::content(self.path, format!("lacks the key {key}"), cure)
+        Error::content(self.path, format!("the key {key} is missing"), cure)
     }
 
     fn refuse_fisheye(&self) -> Result<()> {
@@ -130,21 +130,21 @@ fn read_settings<'a>(text: &'a str, path: &Path) -> Result<Settings<'a>> {
         let indented = trimmed.len() < content.len();
         let name = if indented && !parent.is_empty() { format!("{parent}.{key}") } else { key.to_owned() };
         if !indented {
-            // What has a value of its own is no parent: indentation below it means nothing.
+            // A key with a value is not a parent: indentation below it has no meaning.
             parent = if value.is_empty() || value.starts_with("!!") { key } else { "" };
         }
         if value.is_empty() {
             continue;
         }
         if let Some((_, first)) = settings.insert(name, (value, line)) {
-            let problem = format!("key '{key}' stands on line {first} already");
-            return Err(Error::line(path, line, problem, "keep one of them"));
+            let problem = format!("the key '{key}' is given on line {first} already");
+            return Err(Error::line(path, line, problem, "remove one of the two lines"));
         }
     }
     Ok(settings)
 }
 
-/// Cuts at the first `#` outside quotes.
+/// Removes a comment, which starts at the first `#` outside quotes.
 fn without_comment(line: &str) -> &str {
     let mut quoted = false;
     let end = line.char_indices().find(|&(_, c)| {

@@ -1,11 +1,11 @@
-//! Calibrations published with the data sets.
+//! Calibrations that were published with the data sets.
 
 use yfslam::Camera;
 
 /// Names of the presets.
 pub const PRESETS: [&str; 4] = ["tum1", "tum2", "tum3", "bonn"];
 
-/// The preset of that name; upper or lower case.
+/// Returns the preset with this name, in upper or lower case.
 ///
 /// Sources: the ORB-SLAM2 settings for TUM RGB-D freiburg1, 2 and 3; the calibration published with the Bonn RGB-D Dynamic data set
 /// (Palazzolo et al., IROS 2019).

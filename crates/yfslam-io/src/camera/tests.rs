@@ -15,7 +15,7 @@ fn refusal(text: &str) -> String {
 }
 
 #[test]
-fn a_settings_file_is_read_through_its_quirks() {
+fn a_settings_file_with_unusual_spacing_and_quotes_is_read() {
     let source = settings(SETTINGS).unwrap();
     let camera = &source.camera;
     assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (517.3, 516.5, 318.6, 255.3));
@@ -45,20 +45,20 @@ fn a_missing_key_is_named_with_file_and_cure() {
     for (line, key) in [("Camera.fx: 517.3 # px\n", "Camera.fx"), ("DepthMapFactor: 5000.\n", "DepthMapFactor")] {
         let error = refusal(&SETTINGS.replace(line, ""));
         assert!(
-            error.contains("cam.yaml") && error.contains(&format!("lacks the key {key}")) && error.contains("add"),
+            error.contains("cam.yaml") && error.contains(&format!("the key {key} is missing")) && error.contains("add"),
             "{error}"
         );
     }
 }
 
 #[test]
-fn values_that_are_no_numbers_lines_without_colon_and_double_keys_are_refused() {
+fn invalid_numbers_lines_without_colon_and_repeated_keys_are_refused() {
     let error = refusal(&SETTINGS.replace("517.3", "517,3"));
     assert!(error.contains("cam.yaml:6") && error.contains("517,3"), "{error}");
     assert!(refusal(&SETTINGS.replace("517.3", "nan")).contains("Camera.fx is 'nan'"));
     assert!(refusal(&SETTINGS.replace("640", "640.5")).contains("Camera.width is 640.5"));
     assert!(refusal(&SETTINGS.replace("fy:516.5", "fy 516.5")).contains("cam.yaml:7"));
-    assert!(refusal(&format!("{SETTINGS}Camera.fx: 1\n")).contains("line 6 already"));
+    assert!(refusal(&format!("{SETTINGS}Camera.fx: 1\n")).contains("on line 6 already"));
     assert!(refusal(&format!("{SETTINGS}Camera.type: KannalaBrandt8\n")).contains("KannalaBrandt8"));
 }
 
@@ -90,7 +90,7 @@ fn every_preset_is_a_valid_camera() {
 }
 
 #[test]
-fn our_toml_refuses_unknown_and_missing_keys_with_their_line() {
+fn toml_with_unknown_or_missing_keys_is_refused_with_the_line() {
     let toml = "width = 640\nheight = 480\nfx = 500.0\nfy = 500.0\ncx = 320.0\ncy = 240.0\ndepth_factor = 1000.0\n";
     let source = parse_toml(toml, Path::new("cam.toml")).unwrap();
     assert_eq!((source.camera.fx, source.camera.distortion, source.camera.bf), (500.0, [0.0; 5], 40.0));
@@ -101,7 +101,7 @@ fn our_toml_refuses_unknown_and_missing_keys_with_their_line() {
 }
 
 #[test]
-fn a_camera_is_found_by_path_in_the_folder_or_refused_with_the_presets_named() {
+fn a_camera_is_loaded_by_path_or_from_the_folder_or_refused_with_the_names_of_the_presets() {
     let folder = tempfile::tempdir().unwrap();
     let error = detect_camera(folder.path()).unwrap_err().to_string();
     assert!(error.contains("camera.yaml") && error.contains("tum1"), "{error}");

@@ -10,9 +10,9 @@ use super::{COLOR_SIZE_CURE, DecodeError, ImageSize, check_size};
 
 pub fn decode_color(bytes: &[u8], expected: Option<ImageSize>, into: &mut RgbImage) -> Result<(), DecodeError> {
     if !is_complete(bytes) {
-        return Err(DecodeError::Damaged("it ends before the end mark".into()));
+        return Err(DecodeError::Damaged("it ends before the end-of-image marker".into()));
     }
-    // Strict: damage is an error, not an image whose rest is grey.
+    // Without strict mode the rest of a damaged image would be grey.
     let options = DecoderOptions::default().set_strict_mode(true).jpeg_set_out_colorspace(ColorSpace::RGB);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
     let damaged = |error: zune_jpeg::errors::DecodeErrors| DecodeError::Damaged(error.to_string());
@@ -23,11 +23,11 @@ pub fn decode_color(bytes: &[u8], expected: Option<ImageSize>, into: &mut RgbIma
     decoder.decode_into(into.data_mut().as_flattened_mut()).map_err(damaged)
 }
 
-/// Whether the last scan is followed by the end-of-image mark. The decoder itself lets a file pass that lacks its last few bytes.
+/// Checks for an end-of-image marker after the last scan. The decoder itself accepts a file whose last few bytes are missing.
 fn is_complete(bytes: &[u8]) -> bool {
     const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
     const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
-    // Inside a scan 0xff is followed by 0 or a restart mark, so neither mark can be part of the pixels.
+    // Inside a scan 0xff is followed by 0 or a restart marker, so neither marker can occur within the pixels.
     let last = bytes.windows(2).rev().find(|&mark| mark == START_OF_SCAN || mark == END_OF_IMAGE);
     last == Some(&END_OF_IMAGE)
 }

@@ -1,5 +1,4 @@
-//! Image files in memory to pixels: PNG and JPEG for colour, 16-bit grey PNG for depth, PNG for masks; the content decides, not the
-//! file's name.
+//! Decodes image files: PNG and JPEG for colour, 16-bit grey PNG for depth, PNG for masks. The content decides, not the file name.
 
 mod jpeg;
 mod png;
@@ -8,7 +7,7 @@ use std::fmt;
 
 use yfslam::image::{Image, RgbImage};
 
-/// Largest image decoded, px: room for any camera, and a bound on what a forged header can make us allocate.
+/// Largest image that is decoded, px; it bounds the memory that a forged header can request.
 const MAX_PIXELS: usize = 1 << 25;
 
 /// Width and height of an image.
@@ -32,42 +31,42 @@ pub enum DecodeError {
     /// Neither PNG nor JPEG.
     #[error("is {0}, neither PNG nor JPEG; convert it to PNG")]
     UnknownFormat(&'static str),
-    /// An image, but not of the kind that is needed here.
+    /// An image of another kind than is needed.
     #[error("is {found}; {cure}")]
     WrongKind {
-        /// What it is.
+        /// Kind of the image.
         found: String,
-        /// What to do about it.
+        /// What to do.
         cure: &'static str,
     },
-    /// The image has not the size of the camera.
+    /// The size of the image differs from that of the camera.
     #[error("has {found} pixels, but the camera has {expected}; {cure}")]
     WrongSize {
         /// Size of the image.
         found: ImageSize,
         /// Size of the camera.
         expected: ImageSize,
-        /// What to do about it.
+        /// What to do.
         cure: &'static str,
     },
-    /// More pixels than any camera delivers.
-    #[error("claims {0} pixels; the file is damaged, or scale it down")]
+    /// More pixels than are decoded.
+    #[error("claims {0} pixels, more than are supported; unpack the file again if it is damaged, or scale it down")]
     TooLarge(ImageSize),
     /// Truncated or damaged.
     #[error("is damaged ({0}); record or unpack the file again")]
     Damaged(String),
 }
 
-const COLOR_SIZE_CURE: &str = "give the camera file of this recording (camera.yaml)";
+const COLOR_SIZE_CURE: &str = "use the camera file of this recording (camera.yaml)";
 const DEPTH_SIZE_CURE: &str = "register depth to colour, so that both have the same size";
-const MASK_SIZE_CURE: &str = "make masks from the colour images as they are";
+const MASK_SIZE_CURE: &str = "make the masks from the colour images in their original size";
 const COLOR_KIND_CURE: &str = "colour images are 8-bit grey, RGB, RGBA or palette PNG, or JPEG";
 const DEPTH_KIND_CURE: &str = "depth images are 16-bit grey PNG";
 
-/// Decodes a colour image (PNG or JPEG; grey becomes R = G = B, alpha is dropped) into `into`, whose buffer is used again.
+/// Decodes a colour image (PNG or JPEG; grey becomes R = G = B, alpha is dropped) into `into`, whose buffer is reused.
 ///
 /// # Errors
-/// [`DecodeError`]; a size other than `expected` is found out before any pixel is decoded.
+/// [`DecodeError`]; a size other than `expected` is refused before any pixel is decoded.
 pub fn decode_color(bytes: &[u8], expected: Option<ImageSize>, into: &mut RgbImage) -> Result<(), DecodeError> {
     match Format::of(bytes) {
         Format::Png => png::decode_color(bytes, expected, into),
@@ -76,25 +75,25 @@ pub fn decode_color(bytes: &[u8], expected: Option<ImageSize>, into: &mut RgbIma
     }
 }
 
-/// Decodes a 16-bit grey PNG into `into`, whose buffer is used again.
+/// Decodes a 16-bit grey PNG into `into`, whose buffer is reused.
 ///
 /// # Errors
-/// [`DecodeError`]; a size other than `expected` is found out before any pixel is decoded.
+/// [`DecodeError`]; a size other than `expected` is refused before any pixel is decoded.
 pub fn decode_depth(bytes: &[u8], expected: Option<ImageSize>, into: &mut Image<u16>) -> Result<(), DecodeError> {
     match Format::of(bytes) {
         Format::Png => png::decode_depth(bytes, expected, into),
         Format::Jpeg => {
-            Err(DecodeError::WrongKind { found: "a JPEG, which holds no depth".into(), cure: DEPTH_KIND_CURE })
+            Err(DecodeError::WrongKind { found: "a JPEG, which cannot store depth".into(), cure: DEPTH_KIND_CURE })
         }
         Format::Other(name) => Err(DecodeError::UnknownFormat(name)),
     }
 }
 
-/// Decodes a mask, a PNG of any kind, into `into`, whose buffer is used again: 0 where every colour of the pixel is 0, whatever its
-/// transparency; else the largest byte of its colours, which of 8-bit grey is the value itself.
+/// Decodes a mask, a PNG of any kind, into `into`, whose buffer is reused. A pixel becomes the largest byte of its colours; transparency
+/// is ignored. For 8-bit grey this is the value itself.
 ///
 /// # Errors
-/// [`DecodeError`]; a size other than `expected` is found out before any pixel is decoded.
+/// [`DecodeError`]; a size other than `expected` is refused before any pixel is decoded.
 pub fn decode_mask(bytes: &[u8], expected: Option<ImageSize>, into: &mut Image<u8>) -> Result<(), DecodeError> {
     match Format::of(bytes) {
         Format::Png => png::decode_mask(bytes, expected, into),
@@ -105,7 +104,7 @@ pub fn decode_mask(bytes: &[u8], expected: Option<ImageSize>, into: &mut Image<u
     }
 }
 
-/// File formats told apart by their first bytes.
+/// File formats, distinguished by their first bytes.
 enum Format {
     Png,
     Jpeg,

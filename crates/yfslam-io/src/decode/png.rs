@@ -1,4 +1,4 @@
-//! PNG by the `png` crate, checksums verified to the end of the file.
+//! PNG by the `png` crate, with checksums verified to the end of the file.
 
 use std::io::Cursor;
 
@@ -77,7 +77,7 @@ fn open(bytes: &[u8], transformations: Transformations) -> Result<PngReader<'_>,
     decoder.read_info().map_err(damaged)
 }
 
-/// Decodes the whole image, then reads on to the end mark, so that a cut or altered file does not pass.
+/// Decodes the whole image and reads up to the end marker, so that a truncated or altered file is refused.
 fn read_pixels(reader: &mut PngReader<'_>, pixels: &mut [u8]) -> Result<(), DecodeError> {
     if reader.output_buffer_size() != Some(pixels.len()) {
         return Err(DecodeError::Damaged("the header contradicts itself".into()));
@@ -90,7 +90,7 @@ fn size_of(reader: &PngReader<'_>) -> ImageSize {
     ImageSize { width: reader.info().width as usize, height: reader.info().height as usize }
 }
 
-/// Such as "an 8-bit RGB PNG".
+/// Describes the kind of image, such as "a PNG of 8-bit RGB".
 fn describe(reader: &PngReader<'_>) -> String {
     let kind = match reader.info().color_type {
         ColorType::Grayscale => "grey",

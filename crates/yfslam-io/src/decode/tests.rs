@@ -69,7 +69,7 @@ fn a_mask_is_0_where_a_png_of_any_kind_is_black() {
     let found: Vec<bool> = mask(&png(Grayscale, Sixteen, &deep)).unwrap().iter().map(|value| *value > 0).collect();
     assert_eq!(found, [false, true, true, true, true, false]);
     assert_eq!(mask(&png(Grayscale, One, &[0b0100_0000, 0b0010_0000])).unwrap(), [0, 255, 0, 0, 0, 255]);
-    // Transparency alone is not something.
+    // Transparency alone does not mark an object.
     assert_eq!(mask(&png(GrayscaleAlpha, Eight, &[0, 9, 3, 0, 0, 9, 0, 9, 0, 9, 0, 9])).unwrap(), [0, 3, 0, 0, 0, 0]);
     let error = mask(JPEG).unwrap_err().to_string();
     assert!(error.contains("JPEG") && error.contains("masks are PNG"), "{error}");
@@ -79,7 +79,7 @@ fn a_mask_is_0_where_a_png_of_any_kind_is_black() {
 }
 
 #[test]
-fn a_jpeg_is_decoded_close_to_what_was_drawn() {
+fn a_jpeg_is_decoded_close_to_the_original() {
     let image = color(JPEG).unwrap();
     assert_eq!((image.width(), image.height()), (16, 8));
     for x in 0..16 {
@@ -97,7 +97,7 @@ fn images_of_the_wrong_kind_are_refused_by_name() {
         refusal(depth(&png(Rgb, Eight, &[1; 18]))).contains("a PNG of 8-bit RGB; depth images are 16-bit grey PNG")
     );
     assert!(refusal(depth(&png(GrayscaleAlpha, Sixteen, &[1; 24]))).contains("16-bit grey-alpha"));
-    assert!(refusal(depth(JPEG)).contains("JPEG, which holds no depth"));
+    assert!(refusal(depth(JPEG)).contains("JPEG, which cannot store depth"));
     assert!(refusal(depth(b"")).contains("an empty file"));
     assert!(refusal(depth(b"P5\n3 2\n255\n")).contains("PNM"));
     assert!(color(&depth_png()).unwrap_err().to_string().contains("a PNG of 16-bit grey; colour images"));
@@ -132,7 +132,7 @@ fn every_truncation_of_a_file_is_an_error() {
 fn a_forged_size_is_refused_before_memory_is_taken() {
     let mut forged = depth_png();
     forged[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
-    // The checksum of the header no longer fits, either error is right; what counts is that no terabyte is asked for.
+    // The checksum of the header is wrong too, so both errors are right; no terabyte may be requested.
     assert!(depth(&forged).is_err());
     assert_eq!(
         check_size(ImageSize { width: 1 << 20, height: 1 << 20 }, None, ""),

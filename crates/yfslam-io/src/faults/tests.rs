@@ -2,7 +2,7 @@ use yfslam::{BoundingBox, Detection};
 
 use super::*;
 
-/// Frame `k` of 10 Hz: grey level and depth tell its number, one box.
+/// Returns frame `k` at 10 Hz, with `k` in its grey level and depth, and with one box.
 fn frame(k: i64) -> RgbdFrame {
     let color = RgbImage::from_vec(4, 2, vec![[100 + k as u8; 3]; 8]).unwrap();
     let raw = Image::from_vec(4, 2, vec![1000 + k as u16; 8]).unwrap();
@@ -17,7 +17,7 @@ fn frame(k: i64) -> RgbdFrame {
     }
 }
 
-/// What becomes of ten frames.
+/// Returns the deliveries of ten frames.
 fn deliver(faults: &[&str]) -> Vec<Delivery> {
     let faults = faults.iter().map(|text| text.parse().unwrap()).collect();
     let mut injector = FaultInjector::new(faults, frame(0).timestamp_ns);
@@ -26,7 +26,7 @@ fn deliver(faults: &[&str]) -> Vec<Delivery> {
     std::iter::from_fn(|| injector.pop()).collect()
 }
 
-/// Numbers of the frames by their stamps.
+/// Returns the numbers of the frames from their stamps.
 fn order(deliveries: &[Delivery]) -> Vec<i64> {
     deliveries.iter().map(|d| (d.frame.timestamp_ns - 7_000_000_000) / 100_000_000).collect()
 }
@@ -47,12 +47,12 @@ fn without_a_fault_frames_pass_unchanged() {
 }
 
 #[test]
-fn a_fault_strikes_from_its_start_until_its_end() {
+fn a_fault_affects_frames_from_its_start_until_its_end() {
     assert_eq!(order(&deliver(&["dropped@0.3+0.2"])), [0, 1, 2, 5, 6, 7, 8, 9]);
 }
 
 #[test]
-fn stamps_come_twice_out_of_order_or_not_at_all() {
+fn stamps_are_repeated_out_of_order_or_missing() {
     assert_eq!(order(&deliver(&["repeated@0.8+0.2"])), [0, 1, 2, 3, 4, 5, 6, 7, 8, 8, 9, 9]);
     assert_eq!(order(&deliver(&["late@0.2+0.4"])), [0, 1, 3, 2, 5, 4, 6, 7, 8, 9]);
     assert_eq!(
@@ -66,11 +66,11 @@ fn stamps_come_twice_out_of_order_or_not_at_all() {
 }
 
 #[test]
-fn pictures_go_white_black_dark_or_stay() {
+fn images_become_white_black_dark_or_frozen() {
     for (fault, expected) in [("blank@0.3+0.1", 255), ("black@0.3+0.1", 0)] {
-        let struck = &deliver(&[fault])[3];
-        assert_eq!((grey(struck), depth(struck)), (expected, 1003));
-        assert!(struck.frame.detections.as_ref().unwrap().is_empty());
+        let affected = &deliver(&[fault])[3];
+        assert_eq!((grey(affected), depth(affected)), (expected, 1003));
+        assert!(affected.frame.detections.as_ref().unwrap().is_empty());
     }
     let covered = &deliver(&["covered@0.3+0.1"])[3];
     assert!(covered.frame.color.data().iter().flatten().all(|v| (4..20).contains(v)) && depth(covered) == 0);
@@ -91,7 +91,7 @@ fn faults_at_the_same_time_add_up() {
 }
 
 #[test]
-fn what_is_no_fault_is_refused_with_the_format_and_all_kinds() {
+fn a_malformed_fault_is_refused_with_the_format_and_all_kinds() {
     for (text, words) in [
         ("blak@1+2", "unknown kind 'blak'"),
         ("black", "has no '@' and '+'"),

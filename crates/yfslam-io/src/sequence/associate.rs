@@ -1,11 +1,11 @@
-//! Pairs colour and depth images by time stamp, as the TUM RGB-D benchmark's association does: closest pairs first, each image once.
+//! Association of colour and depth images by time stamp as in the TUM RGB-D benchmark: closest pairs first, each image once.
 
-/// How many neighbours in time, on each side, compete for an image. At 30 Hz that is ±0.27 s; it bounds the work for any tolerance.
+/// Neighbours in time, on each side, that are candidates for an image: ±0.27 s at 30 Hz. This bounds the work for any tolerance.
 const NEIGHBOURS: usize = 8;
 
-/// Index pairs (colour, depth) whose stamps differ by at most `tolerance_ns`, in the order of the colour stamps.
+/// Returns index pairs (colour, depth) whose stamps differ by at most `tolerance_ns`, in the order of the colour stamps.
 ///
-/// Both lists ascend strictly. Ties go to the earlier colour, then the earlier depth image.
+/// Both lists ascend strictly. In a tie the earlier colour image wins, then the earlier depth image.
 pub fn associate(color_ns: &[i64], depth_ns: &[i64], tolerance_ns: i64) -> Vec<(usize, usize)> {
     let mut candidates = Vec::new();
     for (c, &stamp) in color_ns.iter().enumerate() {
@@ -41,11 +41,11 @@ mod tests {
     #[test]
     fn the_closest_pairs_win_and_no_image_is_used_twice() {
         assert_eq!(associate(&[0, 100, 200], &[20, 99, 201], 30), [(0, 0), (1, 1), (2, 2)]);
-        // Both colours are near depth 10; the closer gets it, the other goes without.
+        // Both colour images are close to depth 10; only the closer one is paired.
         assert_eq!(associate(&[5, 11], &[10], 30), [(1, 0)]);
         assert_eq!(associate(&[0, 100], &[21, 79], 20), []);
         assert_eq!(associate(&[0], &[20], 20), [(0, 0)]);
-        // A tie goes to the earlier one.
+        // In a tie the earlier one wins.
         assert_eq!(associate(&[10], &[5, 15], 20), [(0, 0)]);
     }
 

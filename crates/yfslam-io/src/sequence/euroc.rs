@@ -1,7 +1,8 @@
 //! The EuRoC MAV data set in ASL format (Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016).
 //!
-//! In: a folder with `mav0/cam0/` and `cam1/` (`data.csv`, `data/`, `sensor.yaml`) and, if there is one, the truth of the body in
-//! `mav0/state_groundtruth_estimate0/data.csv`. Out: its frames, the calibration after rectification, the truth of the left camera.
+//! In: a folder with `mav0/cam0/` and `cam1/` (`data.csv`, `data/`, `sensor.yaml`) and, optionally, the ground truth of the body in
+//! `mav0/state_groundtruth_estimate0/data.csv`. Out: its frames, the calibration after rectification, the ground truth of the left
+//! camera.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,7 +14,7 @@ use yfslam::config::DepthSource;
 use super::layout::{Calibration, Listing, stereo_or_mono};
 use super::lists::ListedFile;
 use super::pairs::{List, from_lists};
-use super::{SequenceOptions, TruthReader};
+use super::{GroundTruthReader, SequenceOptions};
 use crate::camera::{CameraSource, check_camera};
 use crate::error::{Error, Result};
 use crate::rectify::{MountedCamera, StereoRectification};
@@ -21,10 +22,10 @@ use crate::text::{content_lines, read_text};
 use crate::time::parse_stamp_ns;
 use crate::trajectory::{StampedPose, TrajectoryFile};
 
-/// Largest deviation of a rotation matrix from one.
+/// Largest deviation of a rotation matrix from orthonormality.
 const MAX_ROTATION_ERROR: f64 = 1e-3;
 
-/// `mav0` inside `folder`, or what stands for it.
+/// Returns the folder that holds `cam0`: `mav0` inside `folder`, or `folder` itself.
 pub fn root(folder: &Path) -> Option<PathBuf> {
     [folder.join("mav0"), folder.to_owned()].into_iter().find(|root| root.join("cam0/data.csv").is_file())
 }
@@ -41,7 +42,7 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     let from_folder = |path: &Path| path.strip_prefix(folder).unwrap_or(path).to_owned();
     for entry in &mut entries {
         entry.color_path = from_folder(&entry.color_path);
-        entry.companion.iter_mut().for_each(|companion| companion.path = from_folder(&companion.path));
+        entry.paired_image.iter_mut().for_each(|paired| paired.path = from_folder(&paired.path));
     }
     let yaml = root.join("cam0/sensor.yaml");
     let left = read_camera(&yaml)?;
@@ -56,8 +57,8 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     } else {
         (calibration(left.camera, &yaml, None), left.t_body_cam)
     };
-    let truth = TruthReader::euroc(root.join("state_groundtruth_estimate0/data.csv"), t_body_cam);
-    Ok(Listing { depth_source, entries, report, calibration: Some(calibration), truth })
+    let ground_truth = GroundTruthReader::euroc(root.join("state_groundtruth_estimate0/data.csv"), t_body_cam);
+    Ok(Listing { depth_source, entries, report, calibration: Some(calibration), ground_truth })
 }
 
 fn calibration(camera: Camera, yaml: &Path, rectification: Option<Arc<StereoRectification>>) -> Calibration {
@@ -65,7 +66,7 @@ fn calibration(camera: Camera, yaml: &Path, rectification: Option<Arc<StereoRect
     Calibration { camera: CameraSource { camera, origin, unused_keys: Vec::new() }, rectification }
 }
 
-/// The pictures of a camera.
+/// Lists the images of a camera.
 fn read_list(camera: &Path) -> Result<List> {
     let path = camera.join("data.csv");
     let text = read_text(&path)?;
@@ -73,7 +74,7 @@ fn read_list(camera: &Path) -> Result<List> {
         let columns = line.split_once(',').map(|(stamp, name)| (stamp.trim(), name.trim()));
         let Some((stamp, name)) = columns.filter(|(_, name)| !name.is_empty()) else {
             let cure = "write 'nanoseconds,file', such as '1403636579763555584,1403636579763555584.png'";
-            return Err(Error::line(&path, number, format!("'{line}' is not of that form"), cure));
+            return Err(Error::line(&path, number, format!("'{line}' has another form"), cure));
         };
         Ok(ListedFile { stamp_ns: nanoseconds(stamp, &path, number)?, path: camera.join("data").join(name) })
     };
@@ -96,15 +97,15 @@ fn read_camera(path: &Path) -> Result<MountedCamera> {
         let found = text.lines().find_map(|line| line.trim().strip_prefix(key)?.trim().strip_prefix(':'));
         let found = found.map(|value| value.split('#').next().unwrap_or_default().trim());
         if let Some(other) = found.filter(|value| *value != known) {
-            let cure = format!("only {known} is known: undistort the pictures and give --camera");
+            let cure = format!("only {known} is supported: undistort the images and give --camera");
             return Err(Error::content(path, format!("{key} is '{other}'"), cure));
         }
     }
     let [width, height] = exactly(lists("resolution")?, "resolution", path)?;
     let [fx, fy, cx, cy] = exactly(lists("intrinsics")?, "intrinsics", path)?;
     let [k1, k2, p1, p2] = exactly(lists("distortion_coefficients")?, "distortion_coefficients", path)?;
-    let t_body_cam = rigid(exactly(lists("data")?, "T_BS: data", path)?)
-        .ok_or_else(|| Error::content(path, "T_BS is no rigid motion", "calibrate the cameras again"))?;
+    let t_body_cam = rigid_motion(exactly(lists("data")?, "T_BS: data", path)?)
+        .ok_or_else(|| Error::content(path, "T_BS is not a rigid motion", "calibrate the cameras again"))?;
     let fps = lists("rate_hz").ok().and_then(|rate| rate.first().copied()).unwrap_or(20.0);
     let distortion = [k1, k2, p1, p2, 0.0];
     let (width, height) = (width as usize, height as usize);
@@ -113,15 +114,15 @@ fn read_camera(path: &Path) -> Result<MountedCamera> {
     Ok(MountedCamera { camera, t_body_cam })
 }
 
-/// The numbers behind `key:`, one or a list in brackets, over several lines if need be.
+/// Returns the numbers after `key:`, one or a list in brackets, which may extend over several lines.
 fn numbers(text: &str, key: &str, path: &Path) -> Result<Vec<f64>> {
-    let lacks =
-        || Error::content(path, format!("lacks the key {key}"), "take the sensor.yaml of the data set as it is");
+    let missing =
+        || Error::content(path, format!("the key {key} is missing"), "use the original sensor.yaml of the data set");
     let at = text.lines().find_map(|line| {
         let value = line.trim_start().strip_prefix(key)?.trim_start().strip_prefix(':')?;
         Some(value.as_ptr() as usize - text.as_ptr() as usize)
     });
-    let rest = text.get(at.ok_or_else(lacks)?..).unwrap_or_default();
+    let rest = text.get(at.ok_or_else(missing)?..).unwrap_or_default();
     let line = rest.lines().next().unwrap_or_default();
     let whole = if line.trim_start().starts_with('[') { rest.split(']').next().unwrap_or_default() } else { line };
     let without_comments: Vec<&str> = whole.lines().map(|line| line.split('#').next().unwrap_or_default()).collect();
@@ -129,19 +130,19 @@ fn numbers(text: &str, key: &str, path: &Path) -> Result<Vec<f64>> {
     let words = joined.split(|c: char| c.is_whitespace() || "[],".contains(c)).filter(|word| !word.is_empty());
     let number = |word: &str| match word.parse::<f64>() {
         Ok(number) if number.is_finite() => Ok(number),
-        _ => Err(Error::content(path, format!("{key} holds '{word}', not a number"), "write it with a decimal point")),
+        _ => Err(Error::content(path, format!("{key} is '{word}', not a number"), "write it with a decimal point")),
     };
     words.map(number).collect()
 }
 
 fn exactly<const N: usize>(numbers: Vec<f64>, key: &str, path: &Path) -> Result<[f64; N]> {
     let found = numbers.len();
-    let cure = "take the sensor.yaml of the data set as it is";
+    let cure = "use the original sensor.yaml of the data set";
     numbers.try_into().map_err(|_| Error::content(path, format!("{key} has {found} numbers, not {N}"), cure))
 }
 
-/// A rigid motion from the rows of its matrix; `None` if it is none.
-fn rigid(rows: [f64; 16]) -> Option<Isometry3<f64>> {
+/// Converts a row-major matrix into a rigid motion; `None` if it is not one.
+fn rigid_motion(rows: [f64; 16]) -> Option<Isometry3<f64>> {
     let matrix = Matrix4::from_row_slice(&rows);
     let rotation: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into();
     let error = (rotation * rotation.transpose() - Matrix3::identity()).norm();
@@ -151,16 +152,21 @@ fn rigid(rows: [f64; 16]) -> Option<Isometry3<f64>> {
     is_rotation.then(|| Isometry3::from_parts(translation, rotation))
 }
 
-/// Poses of the camera, from lines `nanoseconds, px, py, pz, qw, qx, qy, qz, …` of the body.
-pub fn parse_truth(text: &str, path: &Path, t_body_cam: &Isometry3<f64>) -> Result<TrajectoryFile> {
+/// Parses poses of the body, `nanoseconds, px, py, pz, qw, qx, qy, qz, …` on each line, and returns those of the camera.
+pub fn parse_ground_truth(text: &str, path: &Path, t_body_cam: &Isometry3<f64>) -> Result<TrajectoryFile> {
     let pose = |(number, line): (usize, &str)| {
-        let cure = "write 'nanoseconds,px,py,pz,qw,qx,qy,qz', more columns if you like";
+        let cure = "write 'nanoseconds,px,py,pz,qw,qx,qy,qz', optionally followed by more columns";
         let mut columns = line.split(',').map(str::trim);
         let timestamp_ns = nanoseconds(columns.next().unwrap_or_default(), path, number)?;
         let values: Vec<f64> =
             columns.take(7).map_while(|text| text.parse().ok().filter(|v: &f64| v.is_finite())).collect();
         let [x, y, z, qw, qx, qy, qz] = values[..] else {
-            return Err(Error::line(path, number, format!("'{line}' has no seven numbers behind the time"), cure));
+            return Err(Error::line(
+                path,
+                number,
+                format!("'{line}' does not have seven numbers after the time"),
+                cure,
+            ));
         };
         let quaternion = Quaternion::new(qw, qx, qy, qz);
         if (quaternion.norm() - 1.0).abs() > 0.05 {
@@ -182,7 +188,7 @@ pub fn parse_truth(text: &str, path: &Path, t_body_cam: &Isometry3<f64>) -> Resu
 mod tests {
     use super::*;
 
-    /// As the data set has it.
+    /// A file like those of the data set.
     const YAML: &str = "# General\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, -0.02,\n         1.0, 0.0, 0.0, \
         -0.06,\n         0.0, 0.0, 1.0, 0.009,\n         0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [752, 480]\n\
         camera_model: pinhole\nintrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv\n\
@@ -196,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_file_is_read_and_what_is_wrong_with_one_is_named() {
+    fn a_sensor_file_is_read_and_errors_in_it_are_named() {
         let MountedCamera { camera: c, t_body_cam } = camera(YAML).unwrap();
         assert_eq!((c.width, c.height, c.fps, c.cy, c.distortion[3]), (752, 480, 20.0, 248.375, 1.76187114e-05));
         let right_of_camera = t_body_cam.rotation * nalgebra::Vector3::x();
@@ -205,9 +211,9 @@ mod tests {
         for (from, to, words) in [
             ("radial-tangential", "equidistant", ["distortion_model is 'equidistant'", "undistort"]),
             ("[752, 480]", "[752]", ["resolution has 1 numbers, not 2", "sensor.yaml"]),
-            ("458.654", "four", ["intrinsics holds 'four'", "decimal point"]),
-            ("data: [0.0, -1.0", "data: [0.5, -1.0", ["T_BS is no rigid motion", "calibrate"]),
-            ("intrinsics:", "intrinsic:", ["lacks the key intrinsics", "as it is"]),
+            ("458.654", "four", ["intrinsics is 'four'", "decimal point"]),
+            ("data: [0.0, -1.0", "data: [0.5, -1.0", ["T_BS is not a rigid motion", "calibrate"]),
+            ("intrinsics:", "intrinsic:", ["the key intrinsics is missing", "original"]),
         ] {
             let error = camera(&YAML.replace(from, to)).unwrap_err().to_string();
             assert!(words.iter().all(|word| error.contains(word)), "{error}");
@@ -215,14 +221,14 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_of_the_body_becomes_that_of_the_camera() {
+    fn the_ground_truth_of_the_body_is_converted_to_the_camera() {
         let t_body_cam = Isometry3::translation(0.0, 0.0, 2.0);
         let text = "#timestamp, p_RS_R_x [m], and so on\n1403636580838555648,4.0,-1.0,0.5,0.0,0.0,1.0,0.0,0.1,0.2\n";
-        let file = parse_truth(text, Path::new("data.csv"), &t_body_cam).unwrap();
+        let file = parse_ground_truth(text, Path::new("data.csv"), &t_body_cam).unwrap();
         assert_eq!(file.poses[0].timestamp_ns, 1_403_636_580_838_555_648);
         // Half a turn about y: the camera's z points along the world's −z.
         assert!((file.poses[0].pose.translation.vector - nalgebra::Vector3::new(4.0, -1.0, -1.5)).norm() < 1e-12);
-        let error = parse_truth("1,2,3\n", Path::new("data.csv"), &t_body_cam).unwrap_err().to_string();
+        let error = parse_ground_truth("1,2,3\n", Path::new("data.csv"), &t_body_cam).unwrap_err().to_string();
         assert!(error.contains("data.csv:1") && error.contains("seven numbers"), "{error}");
     }
 }

@@ -1,11 +1,11 @@
-//! Timing of a sequence: rate, gaps, and how far colour images and their companions lie apart in time.
+//! Timing of a sequence: rate, gaps, and the time offset between paired images.
 
 use super::{FrameEntry, Sequence};
 
 /// Timing of the frames that are played.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SequenceInfo {
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
     /// Time from the first to the last frame, ns.
     pub duration_ns: i64,
@@ -13,35 +13,35 @@ pub struct SequenceInfo {
     pub median_period_ns: i64,
     /// Longest time between neighbouring frames, ns.
     pub max_gap_ns: i64,
-    /// Gaps longer than twice the median period: frames are missing there.
+    /// Number of gaps longer than twice the median period, where frames are missing.
     pub gaps: usize,
-    /// Stamp of the depth image or right picture minus that of the colour image; `None` for a monocular camera.
-    pub offset: Option<CompanionOffset>,
+    /// Time offset of the depth or right images; `None` for a monocular camera.
+    pub offset: Option<TimeOffset>,
 }
 
-/// Stamp of a companion minus that of its colour image over a sequence, ns.
+/// Stamp of the depth or right image minus that of the colour image over a sequence, ns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CompanionOffset {
-    /// Median with its sign; far from zero means that one sensor lags.
+pub struct TimeOffset {
+    /// Signed median; a value far from zero means that one sensor lags.
     pub median_ns: i64,
     /// Largest absolute value.
     pub max_abs_ns: i64,
 }
 
 impl SequenceInfo {
-    /// Frames per second, from the median period; `None` with fewer than two frames.
+    /// Returns the frames per second from the median period; `None` with fewer than two frames.
     pub fn rate_hz(&self) -> Option<f64> {
         (self.median_period_ns > 0).then(|| 1e9 / self.median_period_ns as f64)
     }
 }
 
 impl Sequence {
-    /// Timing of the frames; opens no image.
+    /// Computes the timing of the frames without opening an image.
     pub fn info(&self) -> SequenceInfo {
         let stamps: Vec<i64> = self.entries.iter().map(|e| e.timestamp_ns).collect();
         let mut periods: Vec<i64> = stamps.windows(2).map(|w| w[1].saturating_sub(w[0])).collect();
         let median_period_ns = median(&mut periods);
-        let offset_ns = |e: &FrameEntry| Some(e.companion.as_ref()?.stamp_ns.saturating_sub(e.timestamp_ns));
+        let offset_ns = |e: &FrameEntry| Some(e.paired_image.as_ref()?.stamp_ns.saturating_sub(e.timestamp_ns));
         let mut offsets: Vec<i64> = self.entries.iter().filter_map(offset_ns).collect();
         SequenceInfo {
             frames: stamps.len(),
@@ -49,7 +49,7 @@ impl Sequence {
             median_period_ns,
             max_gap_ns: periods.iter().copied().max().unwrap_or(0),
             gaps: periods.iter().filter(|&&period| period > median_period_ns.saturating_mul(2)).count(),
-            offset: (!offsets.is_empty()).then(|| CompanionOffset {
+            offset: (!offsets.is_empty()).then(|| TimeOffset {
                 median_ns: median(&mut offsets),
                 max_abs_ns: offsets.iter().map(|offset| offset.saturating_abs()).max().unwrap_or(0),
             }),
@@ -57,7 +57,7 @@ impl Sequence {
     }
 }
 
-/// The upper median; 0 for none. Reorders `values`.
+/// Returns the upper median, 0 without values. Reorders `values`.
 fn median(values: &mut [i64]) -> i64 {
     let middle = values.len() / 2;
     if values.is_empty() { 0 } else { *values.select_nth_unstable(middle).1 }
@@ -67,21 +67,21 @@ fn median(values: &mut [i64]) -> i64 {
 mod tests {
     use super::*;
     use crate::sequence::lists::ListedFile;
-    use crate::sequence::{AssociationReport, Layout, TruthReader};
+    use crate::sequence::{AssociationReport, GroundTruthReader, Layout};
     use yfslam::config::DepthSource;
 
     fn sequence(stamps: &[(i64, i64)]) -> Sequence {
         let entry = |&(timestamp_ns, stamp_ns): &(i64, i64)| FrameEntry {
             timestamp_ns,
             color_path: "c".into(),
-            companion: Some(ListedFile { stamp_ns, path: "d".into() }),
+            paired_image: Some(ListedFile { stamp_ns, path: "d".into() }),
         };
         Sequence {
             folder: ".".into(),
             layout: Layout::Tum,
             depth_source: DepthSource::Image,
             calibration: None,
-            truth: TruthReader::tum("groundtruth.txt".into()),
+            ground_truth: GroundTruthReader::tum("groundtruth.txt".into()),
             entries: stamps.iter().map(entry).collect(),
             report: AssociationReport::default(),
             mirror: None,
@@ -96,7 +96,7 @@ mod tests {
         assert_eq!((info.frames, info.duration_ns, info.median_period_ns), (5, 203 * ms, 33 * ms));
         assert_eq!((info.max_gap_ns, info.gaps), (104 * ms, 1));
         assert!((info.rate_hz().unwrap() - 30.303).abs() < 1e-3);
-        assert_eq!(info.offset, Some(CompanionOffset { median_ns: 0, max_abs_ns: 10 * ms }));
+        assert_eq!(info.offset, Some(TimeOffset { median_ns: 0, max_abs_ns: 10 * ms }));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A sequence of the KITTI odometry benchmark (Geiger et al., "Are we ready for autonomous driving?", CVPR 2012).
 //!
-//! In: a folder with `times.txt`, `calib.txt` and the rectified pictures `image_2/` and `image_3/` (colour) or `image_0/` and
-//! `image_1/` (grey). Out: its frames, the calibration, the truth of the left camera.
+//! In: a folder with `times.txt`, `calib.txt` and the rectified images `image_2/` and `image_3/` (colour) or `image_0/` and
+//! `image_1/` (grey). Out: its frames, the calibration, the ground truth of the left camera.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use yfslam::image::RgbImage;
 use super::layout::{Calibration, Listing, stereo_or_mono};
 use super::lists::ListedFile;
 use super::pairs::{List, from_lists};
-use super::{SequenceOptions, TruthReader};
+use super::{GroundTruthReader, SequenceOptions};
 use crate::camera::{CameraSource, check_camera};
 use crate::decode::decode_color;
 use crate::error::{Error, Result};
@@ -21,13 +21,13 @@ use crate::text::{content_lines, read_bytes, read_text};
 use crate::time::parse_stamp_ns;
 use crate::trajectory::{StampedPose, TrajectoryFile};
 
-/// Left and right folders and their numbers in `calib.txt`, preferred first.
+/// Numbers of the left and right cameras, the preferred pair first.
 const PAIRS: [[usize; 2]; 2] = [[2, 3], [0, 1]];
 
-/// Rows of a 3 × 4 matrix.
+/// A 3 × 4 matrix, row-major.
 type Rows = [f64; 12];
 
-/// Whether `folder` is such a sequence.
+/// Returns whether `folder` is such a sequence.
 pub fn is_sequence(folder: &Path) -> bool {
     folder.join("times.txt").is_file() && PAIRS.iter().any(|[left, _]| images(folder, *left).is_dir())
 }
@@ -38,8 +38,8 @@ fn images(folder: &Path, camera: usize) -> PathBuf {
 
 /// Lists the frames of `folder`.
 pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
-    let there = |[left, _]: &&[usize; 2]| images(folder, *left).is_dir();
-    let [left, right] = PAIRS.iter().find(there).copied().unwrap_or(PAIRS[0]);
+    let exists = |[left, _]: &&[usize; 2]| images(folder, *left).is_dir();
+    let [left, right] = PAIRS.iter().find(exists).copied().unwrap_or(PAIRS[0]);
     let depth_source = stereo_or_mono(folder, options, images(folder, right).is_dir())?;
     let path = folder.join("times.txt");
     let stamps_ns = times(&path)?;
@@ -50,8 +50,8 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
         };
         List { files: stamps_ns.iter().enumerate().map(file).collect(), unstamped: 0, path: path.clone() }
     };
-    let companions = (depth_source == DepthSource::Stereo).then(|| list_of(right));
-    let (entries, report) = from_lists(folder, list_of(left), companions, 0)?;
+    let right_images = (depth_source == DepthSource::Stereo).then(|| list_of(right));
+    let (entries, report) = from_lists(folder, list_of(left), right_images, 0)?;
     let calib = folder.join("calib.txt");
     let text = read_text(&calib)?;
     let (p_left, p_right) = (projection(&text, left, &calib)?, projection(&text, right, &calib)?);
@@ -60,28 +60,28 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     check_camera(&camera, &calib.display().to_string())?;
     let camera = CameraSource { camera, origin: calib.display().to_string(), unused_keys: Vec::new() };
     let calibration = Some(Calibration { camera, rectification: None });
-    let truth = TruthReader::kitti(truth_path(folder), t_cam0_cam(&p_left), stamps_ns);
-    Ok(Listing { depth_source, entries, report, calibration, truth })
+    let ground_truth = GroundTruthReader::kitti(ground_truth_path(folder), t_cam0_cam(&p_left), stamps_ns);
+    Ok(Listing { depth_source, entries, report, calibration, ground_truth })
 }
 
-/// Times of all frames, ns.
+/// Reads the times of all frames, ns.
 fn times(path: &Path) -> Result<Vec<i64>> {
     let text = read_text(path)?;
     let stamp = |(number, line): (usize, &str)| {
         parse_stamp_ns(line).map_err(|error| {
-            Error::line(path, number, format!("'{line}' {error}"), "write seconds, such as 1.036224e-01, one a line")
+            Error::line(path, number, format!("'{line}' {error}"), "write seconds, such as 1.036224e-01, one per line")
         })
     };
     content_lines(&text).map(stamp).collect()
 }
 
-/// The matrix `Pk` of `calib.txt`.
+/// Returns the projection matrix of `camera` from `calib.txt`.
 fn projection(text: &str, camera: usize, path: &Path) -> Result<Rows> {
     let found =
         content_lines(text).find_map(|(number, line)| Some((number, line.strip_prefix(&format!("P{camera}:"))?)));
-    let cure = "take the calib.txt of the sequence as it is";
-    let (number, line) = found.ok_or_else(|| Error::content(path, format!("lacks the matrix P{camera}"), cure))?;
-    matrix(line).ok_or_else(|| Error::line(path, number, format!("P{camera} has no 12 numbers"), cure))
+    let cure = "use the original calib.txt of the sequence";
+    let (number, line) = found.ok_or_else(|| Error::content(path, format!("the matrix P{camera} is missing"), cure))?;
+    matrix(line).ok_or_else(|| Error::line(path, number, format!("P{camera} does not have 12 numbers"), cure))
 }
 
 fn matrix(line: &str) -> Option<Rows> {
@@ -90,16 +90,16 @@ fn matrix(line: &str) -> Option<Rows> {
 }
 
 fn camera(folder: &Path, first: &Option<PathBuf>, left: &Rows, right: &Rows, stamps_ns: &[i64]) -> Result<Camera> {
-    let (mut bytes, mut picture) = (Vec::new(), RgbImage::default());
+    let (mut bytes, mut image) = (Vec::new(), RgbImage::default());
     let path = first.as_deref().unwrap_or(folder);
     read_bytes(path, &mut bytes).map_err(|source| Error::read(path, source))?;
-    decode_color(&bytes, None, &mut picture)
+    decode_color(&bytes, None, &mut image)
         .map_err(|error| Error::content(path, error.to_string(), "unpack the sequence again"))?;
     let [fx, _, cx, of_left, _, fy, cy, ..] = *left;
     let span_s = stamps_ns.first().zip(stamps_ns.last()).map_or(0.0, |(first, last)| (last - first) as f64 * 1e-9);
     Ok(Camera {
-        width: picture.width(),
-        height: picture.height(),
+        width: image.width(),
+        height: image.height(),
         fx,
         fy,
         cx,
@@ -111,14 +111,14 @@ fn camera(folder: &Path, first: &Option<PathBuf>, left: &Rows, right: &Rows, sta
     })
 }
 
-/// Pose of a camera in camera 0, to which it is parallel: P = K [1 | t] with t = −(its position).
+/// Returns the pose of a camera in the frame of camera 0, to which it is parallel: P = K [1 | t] with t = −position.
 fn t_cam0_cam(p: &Rows) -> Isometry3<f64> {
     let [fx, _, cx, x, _, fy, cy, y, _, _, _, z] = *p;
     Isometry3::translation(-(x - cx * z) / fx, -(y - cy * z) / fy, -z)
 }
 
-/// `poses/NN.txt` beside the `sequences` that `folder` is one of, as the benchmark has it, or `groundtruth.txt` in `folder`.
-fn truth_path(folder: &Path) -> Option<PathBuf> {
+/// Finds `groundtruth.txt` in `folder`, or `poses/NN.txt` beside the folder `sequences`, where the benchmark has it.
+fn ground_truth_path(folder: &Path) -> Option<PathBuf> {
     let folder = folder.canonicalize().ok()?;
     let mut name = folder.file_name()?.to_owned();
     name.push(".txt");
@@ -126,20 +126,25 @@ fn truth_path(folder: &Path) -> Option<PathBuf> {
     [folder.join("groundtruth.txt"), beside].into_iter().find(|path| path.is_file())
 }
 
-/// Whether `text` is a list of 3 × 4 matrices.
-pub fn is_truth(text: &str) -> bool {
+/// Returns whether `text` is a list of 3 × 4 matrices.
+pub fn is_ground_truth(text: &str) -> bool {
     content_lines(text).next().is_some_and(|(_, line)| matrix(line).is_some())
 }
 
-/// Poses of the camera, from one matrix a line, of camera 0 at the time of each frame.
-pub fn parse_truth(text: &str, path: &Path, t_cam0_cam: &Isometry3<f64>, stamps_ns: &[i64]) -> Result<TrajectoryFile> {
+/// Parses the poses of camera 0, one matrix per line and frame, and returns those of the camera.
+pub fn parse_ground_truth(
+    text: &str,
+    path: &Path,
+    t_cam0_cam: &Isometry3<f64>,
+    stamps_ns: &[i64],
+) -> Result<TrajectoryFile> {
     let lines: Vec<(usize, &str)> = content_lines(text).collect();
     if lines.len() != stamps_ns.len() {
         let problem = format!("holds {} poses, but times.txt has {} frames", lines.len(), stamps_ns.len());
-        return Err(Error::content(path, problem, "give the poses of this sequence"));
+        return Err(Error::content(path, problem, "use the poses of this sequence"));
     }
     let pose = |((number, line), &timestamp_ns): ((usize, &str), &i64)| {
-        let bad = || Error::line(path, number, "is no 3 × 4 matrix of a pose", "write its 12 numbers row by row");
+        let bad = || Error::line(path, number, "is not the 3 × 4 matrix of a pose", "write its 12 numbers row by row");
         let m = matrix(line).ok_or_else(bad)?;
         let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
         if (rotation * rotation.transpose() - Matrix3::identity()).norm() > 1e-2 || rotation.determinant() < 0.0 {
@@ -157,8 +162,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_truth_of_camera_0_becomes_that_of_the_colour_camera() {
-        // Of sequence 00: camera 2 stands 6 cm to the left of camera 0.
+    fn the_ground_truth_of_camera_0_is_converted_to_the_colour_camera() {
+        // From sequence 00: camera 2 is 6 cm to the left of camera 0.
         let p2 = projection(
             "P2: 718.856 0.0 607.1928 45.38225 0.0 718.856 185.2157 -0.1130887 0.0 0.0 1.0 0.003779761\n",
             2,
@@ -167,13 +172,14 @@ mod tests {
         let mount = t_cam0_cam(&p2.unwrap());
         assert!((mount.translation.x + 0.0599).abs() < 1e-3 && mount.translation.y.abs() < 2e-3);
         let text = "1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n";
-        let file = parse_truth(text, Path::new("00.txt"), &mount, &[0, 100]).unwrap();
+        let file = parse_ground_truth(text, Path::new("00.txt"), &mount, &[0, 100]).unwrap();
         assert!((file.poses[1].pose.translation.vector - Vector3::new(4.94, 6.0, 8.0)).norm() < 6e-3);
-        let error = parse_truth(text, Path::new("00.txt"), &mount, &[0]).unwrap_err().to_string();
+        let error = parse_ground_truth(text, Path::new("00.txt"), &mount, &[0]).unwrap_err().to_string();
         assert!(error.contains("holds 2 poses") && error.contains("1 frames"), "{error}");
-        let error = parse_truth("2 0 0 0 0 1 0 0 0 0 1 0", Path::new("00.txt"), &mount, &[0]).unwrap_err().to_string();
+        let error =
+            parse_ground_truth("2 0 0 0 0 1 0 0 0 0 1 0", Path::new("00.txt"), &mount, &[0]).unwrap_err().to_string();
         assert!(error.contains("00.txt:1") && error.contains("3 × 4"), "{error}");
         let error = projection("P0: 1 2 3\n", 2, Path::new("calib.txt")).unwrap_err().to_string();
-        assert!(error.contains("lacks the matrix P2"), "{error}");
+        assert!(error.contains("the matrix P2 is missing"), "{error}");
     }
 }

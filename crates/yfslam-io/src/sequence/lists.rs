@@ -1,4 +1,4 @@
-//! `rgb.txt`, `depth.txt` (`stamp file`) and `associations.txt` (`stamp file stamp file`) as the TUM RGB-D benchmark defines them.
+//! The lists of the TUM RGB-D benchmark: `rgb.txt` and `depth.txt` (`stamp file`), `associations.txt` (`stamp file stamp file`).
 
 use std::path::{Path, PathBuf};
 
@@ -11,14 +11,14 @@ use crate::time::parse_stamp_ns;
 pub struct ListedFile {
     /// Time stamp, ns.
     pub stamp_ns: i64,
-    /// The path as the list has it, relative to the folder of the list.
+    /// Path relative to the folder of the list.
     pub path: PathBuf,
 }
 
-/// Entries of a list, and the number of lines left out because their stamp is `nan`.
+/// Entries of a list, and the number of lines that were skipped because their stamp is `nan`.
 pub type Listed<T> = (Vec<T>, usize);
 
-/// Parses lines `stamp file`; the file name may hold blanks.
+/// Parses lines `stamp file`; the file name may contain blanks.
 ///
 /// # Errors
 /// A malformed line, named by number and `source`.
@@ -62,7 +62,7 @@ pub fn parse_pair_list(text: &str, source: &Path) -> Result<Listed<[ListedFile; 
     Ok((pairs, unstamped))
 }
 
-/// `None` where the recorder knew no time: it wrote `nan`.
+/// Returns the entry, or `None` if its stamp is `nan`.
 fn listed_file(stamp: &str, name: &str, source: &Path, line: usize) -> Result<Option<ListedFile>> {
     if stamp.eq_ignore_ascii_case("nan") {
         return Ok(None);
@@ -78,7 +78,7 @@ fn listed_file(stamp: &str, name: &str, source: &Path, line: usize) -> Result<Op
     Ok(Some(ListedFile { stamp_ns, path: name.into() }))
 }
 
-/// Whether the second column of files is the colour image, judged by names such as `depth/…` and `rgb/…`; `None` if they don't tell.
+/// Decides from names such as `depth/…` and `rgb/…` whether the second column is the colour image; `None` if they do not show it.
 pub fn color_is_second(pairs: &[[ListedFile; 2]]) -> Option<bool> {
     pairs.iter().find_map(|[a, b]| match (names_depth(&a.path), names_depth(&b.path)) {
         (Some(a), Some(b)) if a == b => None,
@@ -88,7 +88,7 @@ pub fn color_is_second(pairs: &[[ListedFile; 2]]) -> Option<bool> {
     })
 }
 
-/// `Some(true)` for a depth image, `Some(false)` for a colour image, by the words in its path.
+/// Returns whether the words in the path name a depth image or a colour image; `None` for neither.
 fn names_depth(path: &Path) -> Option<bool> {
     let name = path.to_string_lossy().to_lowercase();
     if name.contains("depth") {
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_without_a_time_are_left_out_and_counted() {
+    fn lines_without_a_time_are_skipped_and_counted() {
         let path = Path::new("a.txt");
         let (files, unstamped) = parse_file_list("1 a\nnan b\nNaN c\n2 d\n", path).unwrap();
         assert_eq!((files.len(), unstamped), (2, 2));

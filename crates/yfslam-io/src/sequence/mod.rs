@@ -1,16 +1,17 @@
-//! A recorded sequence: a folder in the layout of the TUM RGB-D benchmark, which the Bonn data set shares, or one of the stereo
-//! benchmarks EuRoC and KITTI.
+//! A recorded sequence: a folder in the layout of the TUM RGB-D benchmark, which the Bonn data set shares, or of the stereo benchmarks
+//! EuRoC and KITTI.
 //!
-//! In: the folder and [`SequenceOptions`]. Out: the frames to play, in order, and a report of what was left out and why.
+//! In: the folder and [`SequenceOptions`]. Out: the frames in order, and a report of what was skipped and why.
 
 mod associate;
 pub(crate) mod euroc;
+mod ground_truth;
 mod info;
 pub(crate) mod kitti;
 mod layout;
 pub mod lists;
 mod pairs;
-mod truth;
+mod tum;
 
 use std::path::{Path, PathBuf};
 
@@ -18,22 +19,22 @@ use yfslam::config::DepthSource;
 
 use crate::error::{Error, Result};
 use crate::time::TimeMirror;
-pub use info::{CompanionOffset, SequenceInfo};
+pub use ground_truth::GroundTruthReader;
+pub use info::{SequenceInfo, TimeOffset};
 pub use layout::{Calibration, Layout};
 use lists::ListedFile;
-pub use truth::TruthReader;
 
-/// How a sequence is read and which part of it is played.
+/// Options for reading a sequence, and the part of it that is played.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SequenceOptions {
-    /// What is read of the folder; `None` reads what it has, depth before right pictures.
+    /// The images that are read; `None` reads those that exist, depth images before right images.
     pub depth_source: Option<DepthSource>,
-    /// Largest difference between the stamps of a colour image and its companion, ns.
-    /// 20 ms is the default of the TUM RGB-D benchmark. An `associations.txt` is taken at its word.
+    /// Largest difference between the stamps of paired images, ns. 20 ms is the default of the TUM RGB-D benchmark. The pairs of an
+    /// `associations.txt` are used as they are.
     pub association_tolerance_ns: i64,
     /// First frame to play, counted from 0 after association.
     pub start: usize,
-    /// The frame to stop before; `None` plays to the end.
+    /// End of the part (exclusive); `None` plays to the end.
     pub end: Option<usize>,
     /// Plays the part backward, with mirrored stamps; see [`TimeMirror`].
     pub reverse: bool,
@@ -45,39 +46,39 @@ impl Default for SequenceOptions {
     }
 }
 
-/// One colour image and what belongs to it.
+/// The image files of one frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameEntry {
-    /// Time of the colour image, ns; the time of the frame.
+    /// Time of the colour image and the frame, ns.
     pub timestamp_ns: i64,
     /// The colour image.
     pub color_path: PathBuf,
-    /// The depth image or the right picture, whichever [`Sequence::depth_source`] says; `None` for a monocular camera.
-    pub companion: Option<ListedFile>,
+    /// The depth image or the right image, depending on [`Sequence::depth_source`]; `None` for a monocular camera.
+    pub paired_image: Option<ListedFile>,
 }
 
-/// What association found, before any part was cut out.
+/// Result of the association, for the whole sequence.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct AssociationReport {
     /// Whether the pairs come from an `associations.txt`, not from `rgb.txt` and `depth.txt`.
     pub from_associations_file: bool,
-    /// Colour images listed.
+    /// Number of colour images in the list.
     pub color_listed: usize,
-    /// Companions listed: depth images or right pictures.
-    pub companions_listed: usize,
-    /// Pairs found.
+    /// Number of depth or right images in the list.
+    pub paired_images_listed: usize,
+    /// Number of pairs.
     pub paired: usize,
-    /// Colour images without a companion within the tolerance.
+    /// Colour images without a depth or right image within the tolerance.
     pub color_unmatched: usize,
-    /// Companions without a colour image within the tolerance.
-    pub companions_unmatched: usize,
-    /// Entries skipped because their stamp (or companion) had been there already.
+    /// Depth or right images without a colour image within the tolerance.
+    pub paired_images_unmatched: usize,
+    /// Entries skipped because their stamp or their depth image occurred before.
     pub duplicates_skipped: usize,
     /// Entries skipped because their stamps run backward.
     pub backward_skipped: usize,
     /// Entries skipped because their stamp is `nan`.
     pub unstamped_skipped: usize,
-    /// Frames of which a file does not exist; they are played as errors.
+    /// Frames with a file that does not exist; they are played as errors.
     pub missing_files: usize,
 }
 
@@ -86,39 +87,39 @@ pub struct AssociationReport {
 pub struct Sequence {
     /// The folder.
     pub folder: PathBuf,
-    /// How it is laid out.
+    /// Layout of the folder.
     pub layout: Layout,
-    /// Where depth comes from, which is what the companions are.
+    /// Source of depth.
     pub depth_source: DepthSource,
     /// The frames; stamps ascend strictly.
     pub entries: Vec<FrameEntry>,
-    /// What was found and what was left out.
+    /// Result of the association.
     pub report: AssociationReport,
-    /// Set when the sequence is played backward.
+    /// Mirror of the time stamps if the sequence is played backward.
     pub mirror: Option<TimeMirror>,
-    /// The calibration that a layout brings along; TUM folders have a camera file instead ([`detect_camera`](crate::detect_camera)).
+    /// Calibration that is part of the layout; TUM folders have a camera file instead ([`detect_camera`](crate::detect_camera)).
     pub calibration: Option<Calibration>,
-    /// Reads its ground truth.
-    pub truth: TruthReader,
+    /// Reader of the ground truth.
+    pub ground_truth: GroundTruthReader,
 }
 
 impl Sequence {
-    /// Reads the lists of `folder`. In TUM layout: `associations.txt` if it is there, else `rgb.txt` with `depth.txt` or `right.txt`.
+    /// Reads the lists of `folder`. In TUM layout: `associations.txt` if it exists, else `rgb.txt` with `depth.txt` or `right.txt`.
     ///
     /// # Errors
-    /// A folder without lists, a malformed line, lists without a single pair, no image file at all, or a part beyond the end.
+    /// The folder has no lists, a line is malformed, no images can be paired, no image file exists, or the part is empty.
     pub fn open(folder: &Path, options: &SequenceOptions) -> Result<Self> {
         if options.association_tolerance_ns < 0 {
             let problem = format!("association tolerance {} ns is negative", options.association_tolerance_ns);
             return Err(Error::argument(problem, "give a time of 0 or more, such as 20 ms"));
         }
         let layout = Layout::of(folder);
-        let layout::Listing { depth_source, mut entries, mut report, calibration, truth } =
+        let layout::Listing { depth_source, mut entries, mut report, calibration, ground_truth } =
             layout.list(folder, options)?;
         for entry in &mut entries {
             entry.color_path = folder.join(&entry.color_path);
-            if let Some(companion) = &mut entry.companion {
-                companion.path = folder.join(&companion.path);
+            if let Some(paired) = &mut entry.paired_image {
+                paired.path = folder.join(&paired.path);
             }
         }
         report.paired = entries.len();
@@ -134,19 +135,19 @@ impl Sequence {
         }
         let (entries, mirror) = cut(folder, entries, options)?;
         let folder = folder.into();
-        Ok(Self { folder, layout, depth_source, entries, report, mirror, calibration, truth })
+        Ok(Self { folder, layout, depth_source, entries, report, mirror, calibration, ground_truth })
     }
 }
 
 impl FrameEntry {
-    /// The first of its files that does not exist.
+    /// Returns the first of its files that does not exist.
     fn missing(&self) -> Option<&Path> {
-        let companion = self.companion.iter().map(|companion| companion.path.as_path());
-        std::iter::once(self.color_path.as_path()).chain(companion).find(|path| !path.is_file())
+        let paired = self.paired_image.iter().map(|paired| paired.path.as_path());
+        std::iter::once(self.color_path.as_path()).chain(paired).find(|path| !path.is_file())
     }
 }
 
-/// Takes `start..end` and turns it round if asked to.
+/// Cuts out `start..end` and reverses it if requested.
 fn cut(
     folder: &Path,
     mut entries: Vec<FrameEntry>,
@@ -154,8 +155,9 @@ fn cut(
 ) -> Result<(Vec<FrameEntry>, Option<TimeMirror>)> {
     let end = options.end.unwrap_or(entries.len()).min(entries.len());
     if options.start >= end {
-        let asked = options.end.map_or("the end".to_owned(), |end| end.to_string());
-        let problem = format!("frames {} to {asked} of its {} frames are none", options.start, entries.len());
+        let end_text = options.end.map_or("the end".to_owned(), |end| end.to_string());
+        let problem =
+            format!("the part from frame {} to {end_text} of its {} frames is empty", options.start, entries.len());
         return Err(Error::content(folder, problem, "choose a smaller start or a larger end"));
     }
     entries.truncate(end);
@@ -166,8 +168,8 @@ fn cut(
         entries.reverse();
         for entry in &mut entries {
             entry.timestamp_ns = mirror.apply(entry.timestamp_ns);
-            if let Some(companion) = &mut entry.companion {
-                companion.stamp_ns = mirror.apply(companion.stamp_ns);
+            if let Some(paired) = &mut entry.paired_image {
+                paired.stamp_ns = mirror.apply(paired.stamp_ns);
             }
         }
     }

@@ -1,4 +1,4 @@
-//! From the lists of a folder to pairs of images, with a count of what is left out.
+//! Pairs the images of the lists of a folder and counts those that are skipped.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use super::associate::associate;
 use super::lists::{ListedFile, color_is_second, parse_file_list, parse_pair_list};
 use super::{AssociationReport, FrameEntry};
-use crate::ascending::keep_ascending;
 use crate::error::{Error, Result};
 use crate::text::read_text;
 use crate::time::format_stamp;
+use crate::timestamp_order::keep_ascending;
 
-/// Takes the pairs of an `associations.txt`, colour and depth; the paths are still relative to its folder.
+/// Reads the pairs of an `associations.txt`, colour and depth; the paths are relative to its folder.
 pub fn from_associations(path: &Path) -> Result<(Vec<FrameEntry>, AssociationReport)> {
     let (pairs, unstamped_skipped) = parse_pair_list(&read_text(path)?, path)?;
-    // Names decide; where they are silent the customary order holds: colour first.
+    // Where the names do not decide, colour comes first, as is customary.
     let swapped = color_is_second(&pairs).unwrap_or(false);
     let listed = pairs.len() + unstamped_skipped;
     let entry = |[a, b]: [ListedFile; 2]| if swapped { frame_entry(b, a) } else { frame_entry(a, b) };
@@ -22,20 +22,20 @@ pub fn from_associations(path: &Path) -> Result<(Vec<FrameEntry>, AssociationRep
     let mut report = AssociationReport {
         from_associations_file: true,
         color_listed: listed,
-        companions_listed: listed,
+        paired_images_listed: listed,
         unstamped_skipped,
         ..Default::default()
     };
     let kept = in_order(all, |e| e.timestamp_ns, path, &mut report)?;
     let ascending = kept.len();
     let mut depth_seen = BTreeSet::new();
-    let is_new = |e: &FrameEntry| e.companion.as_ref().is_none_or(|depth| depth_seen.insert(depth.path.clone()));
+    let is_new = |e: &FrameEntry| e.paired_image.as_ref().is_none_or(|depth| depth_seen.insert(depth.path.clone()));
     let entries: Vec<_> = kept.into_iter().filter(is_new).collect();
     report.duplicates_skipped += ascending - entries.len();
     Ok((entries, report))
 }
 
-/// A list of images: its entries, the lines left out because they have no time, and the file that it is.
+/// A list of images: its entries, the number of lines without a time, and its path.
 pub struct List {
     pub files: Vec<ListedFile>,
     pub unstamped: usize,
@@ -43,49 +43,49 @@ pub struct List {
 }
 
 impl List {
-    /// Reads a list of the TUM benchmark; the paths are still relative to its folder.
+    /// Reads a list of the TUM benchmark; the paths are relative to its folder.
     pub fn read(path: PathBuf) -> Result<Self> {
         let (files, unstamped) = parse_file_list(&read_text(&path)?, &path)?;
         Ok(Self { files, unstamped, path })
     }
 
-    /// The entries whose stamps ascend; counts all others in `report`.
+    /// Returns the entries whose stamps ascend and counts all others in `report`.
     fn in_order(self, report: &mut AssociationReport) -> Result<Vec<ListedFile>> {
         report.unstamped_skipped += self.unstamped;
         in_order(self.files, |file| file.stamp_ns, &self.path, report)
     }
 }
 
-/// Pairs the images of two lists by time; without a second one each image stands alone.
+/// Pairs the images of two lists by time; without a second list each image is a frame by itself.
 pub fn from_lists(
     folder: &Path,
     color: List,
-    companions: Option<List>,
+    paired: Option<List>,
     tolerance_ns: i64,
 ) -> Result<(Vec<FrameEntry>, AssociationReport)> {
     let listed = |list: &List| list.files.len() + list.unstamped;
     let mut report = AssociationReport {
         color_listed: listed(&color),
-        companions_listed: companions.as_ref().map_or(0, listed),
+        paired_images_listed: paired.as_ref().map_or(0, listed),
         ..Default::default()
     };
     let color = color.in_order(&mut report)?;
-    let Some(companions) = companions else {
+    let Some(paired) = paired else {
         let alone =
-            |color: ListedFile| FrameEntry { timestamp_ns: color.stamp_ns, color_path: color.path, companion: None };
+            |color: ListedFile| FrameEntry { timestamp_ns: color.stamp_ns, color_path: color.path, paired_image: None };
         return Ok((color.into_iter().map(alone).collect(), report));
     };
-    let what = if companions.path.ends_with("depth.txt") { "depth image" } else { "right picture" };
-    let companions = companions.in_order(&mut report)?;
+    let what = if paired.path.ends_with("depth.txt") { "depth image" } else { "right image" };
+    let paired = paired.in_order(&mut report)?;
     let stamps = |files: &[ListedFile]| files.iter().map(|f| f.stamp_ns).collect::<Vec<_>>();
-    let pairs = associate(&stamps(&color), &stamps(&companions), tolerance_ns);
+    let pairs = associate(&stamps(&color), &stamps(&paired), tolerance_ns);
     if pairs.is_empty() {
         let first = |files: &[ListedFile]| files.first().map_or(String::new(), |file| format_stamp(file.stamp_ns));
         let tolerance_ms = tolerance_ns as f64 * 1e-6;
         let problem = format!(
             "no colour image has a {what} within {tolerance_ms:.1} ms; the first stamps are {} and {}",
             first(&color),
-            first(&companions)
+            first(&paired)
         );
         return Err(Error::content(
             folder,
@@ -94,11 +94,11 @@ pub fn from_lists(
         ));
     }
     report.color_unmatched = color.len() - pairs.len();
-    report.companions_unmatched = companions.len() - pairs.len();
-    Ok((pairs.into_iter().map(|(c, d)| frame_entry(color[c].clone(), companions[d].clone())).collect(), report))
+    report.paired_images_unmatched = paired.len() - pairs.len();
+    Ok((pairs.into_iter().map(|(c, d)| frame_entry(color[c].clone(), paired[d].clone())).collect(), report))
 }
 
-/// Refuses an empty list, drops what does not ascend in time and counts it.
+/// Refuses an empty list; drops the entries whose stamps do not ascend and counts them.
 fn in_order<T>(
     items: Vec<T>,
     stamp: impl Fn(&T) -> i64,
@@ -106,11 +106,7 @@ fn in_order<T>(
     report: &mut AssociationReport,
 ) -> Result<Vec<T>> {
     if items.is_empty() {
-        return Err(Error::content(
-            path,
-            "lists no image that has a time stamp",
-            "record or unpack the sequence again",
-        ));
+        return Err(Error::content(path, "lists no image with a time stamp", "record or unpack the sequence again"));
     }
     let kept = keep_ascending(items, stamp, path)?;
     report.duplicates_skipped += kept.duplicates;
@@ -118,6 +114,6 @@ fn in_order<T>(
     Ok(kept.items)
 }
 
-fn frame_entry(color: ListedFile, companion: ListedFile) -> FrameEntry {
-    FrameEntry { timestamp_ns: color.stamp_ns, color_path: color.path, companion: Some(companion) }
+fn frame_entry(color: ListedFile, paired: ListedFile) -> FrameEntry {
+    FrameEntry { timestamp_ns: color.stamp_ns, color_path: color.path, paired_image: Some(paired) }
 }

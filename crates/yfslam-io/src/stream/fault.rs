@@ -1,4 +1,4 @@
-//! Why a frame cannot be used.
+//! Reasons why a frame cannot be used.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use crate::decode::DecodeError;
 use crate::error::Error;
 use crate::time::format_stamp;
 
-/// A frame that cannot be used; the caller counts it and goes on.
+/// A frame that cannot be used; the caller counts it and continues.
 #[derive(Debug, thiserror::Error)]
 #[error("frame {index} (t = {}): {fault}", format_stamp(*timestamp_ns))]
 pub struct FrameError {
@@ -14,7 +14,7 @@ pub struct FrameError {
     pub index: usize,
     /// Time of the frame, ns.
     pub timestamp_ns: i64,
-    /// What is wrong.
+    /// What is wrong with the frame.
     pub fault: FrameFault,
 }
 
@@ -24,7 +24,7 @@ pub enum FrameFault {
     /// A file is missing or cannot be read.
     #[error(transparent)]
     Unreadable(Error),
-    /// A file is not the image that is needed.
+    /// A file cannot be decoded as the image that is needed.
     #[error("{} {source}", path.display())]
     Image {
         /// The file.
@@ -38,7 +38,7 @@ pub enum FrameFault {
         /// The depth image.
         path: PathBuf,
     },
-    /// A decoder thread ended early, which is a defect of the decoder.
+    /// A decoder thread panicked, which is a defect of the decoder.
     #[error("the decoder stopped; please report this sequence as a defect")]
     DecoderStopped,
 }

@@ -1,10 +1,10 @@
-//! Frames decoded ahead of their use: one thread for colour, one for depth or right pictures, both held back by a bounded channel.
+//! Decodes frames ahead of their use: one thread for colour images, one for depth or right images, each with a bounded queue.
 //!
-//! In: the entries of a [`Sequence`] and its camera. Out: an iterator of frames, in order; a frame that cannot be used comes as a
+//! In: the entries of a [`Sequence`] and its camera. Out: an iterator of frames, in order; a frame that cannot be used becomes a
 //! [`FrameError`]. Dropping the stream ends the threads.
 
 mod fault;
-mod lane;
+mod prefetch_queue;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -20,20 +20,19 @@ use crate::rectify::{Remap, StereoRectification};
 use crate::sequence::{FrameEntry, Sequence};
 use crate::text::read_bytes;
 pub use fault::{FrameError, FrameFault};
-use lane::{Decoded, Lane};
+use prefetch_queue::{Decoded, PrefetchQueue};
 
-/// Images that wait decoded for the caller unless told otherwise; each thread holds one more in its hands.
-/// A 640×480 frame takes 1.5 MB.
+/// Default number of decoded images in each queue; each thread holds one more. A 640×480 frame takes 1.5 MB.
 pub const DEFAULT_LOOK_AHEAD: usize = 4;
 
-/// Time spent on images so far.
+/// Time spent on images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DecodeTimes {
-    /// Reading and decoding colour images, on their thread.
+    /// Reading and decoding colour images on their thread.
     pub color: Duration,
-    /// Reading and decoding depth images or right pictures, on their thread.
-    pub companion: Duration,
-    /// What the caller of the iterator waited.
+    /// Reading and decoding depth or right images on their thread.
+    pub paired_image: Duration,
+    /// Waiting of the caller.
     pub waited: Duration,
 }
 
@@ -41,60 +40,63 @@ pub struct DecodeTimes {
 pub struct FrameStream {
     entries: Arc<[FrameEntry]>,
     next: usize,
-    color: Lane<RgbImage>,
-    companions: Companions,
+    color: PrefetchQueue<RgbImage>,
+    paired_images: PairedImages,
     times: DecodeTimes,
 }
 
-/// What comes with the colour images.
-enum Companions {
-    Depth(Lane<DepthImage>),
-    /// Right pictures, and the depth image of a camera that has none.
-    Right(Lane<RgbImage>, Arc<DepthImage>),
+/// The images that are paired with the colour images.
+enum PairedImages {
+    Depth(PrefetchQueue<DepthImage>),
+    /// Right images, and the empty depth image of each frame.
+    Right(PrefetchQueue<RgbImage>, Arc<DepthImage>),
     None(Arc<DepthImage>),
 }
 
 impl FrameStream {
-    /// Starts to decode `sequence`; up to `look_ahead` frames wait for the caller.
+    /// Starts to decode `sequence`; up to `look_ahead` decoded frames wait for the caller.
     ///
     /// # Errors
-    /// No thread can be started.
+    /// A thread cannot be started.
     pub fn open(sequence: &Sequence, camera: &Camera, look_ahead: usize) -> Result<Self> {
         let entries: Arc<[FrameEntry]> = sequence.entries.as_slice().into();
         let size = ImageSize { width: camera.width, height: camera.height };
         let metres_per_unit = (1.0 / camera.depth_factor) as f32;
         let rectification = sequence.calibration.as_ref().and_then(|calibration| calibration.rectification.clone());
-        let mut read_left = PictureReader { size, bytes: Vec::new(), rectification };
-        let mut read_right = PictureReader { bytes: Vec::new(), ..read_left.clone() };
-        let color = Lane::start("yfslam-color", entries.clone(), look_ahead, move |entry| {
+        let mut read_left = ColorReader { size, bytes: Vec::new(), rectification };
+        let mut read_right = ColorReader { bytes: Vec::new(), ..read_left.clone() };
+        let color = PrefetchQueue::start("yfslam-color", entries.clone(), look_ahead, move |entry| {
             read_left.read(&entry.color_path, StereoRectification::left)
         })?;
         let no_depth = || Arc::new(DepthImage { raw: Image::new(size.width, size.height), metres_per_unit });
         let mut bytes = Vec::new();
-        let companions = match sequence.depth_source {
+        let paired_images = match sequence.depth_source {
             DepthSource::Image => {
-                let read = move |entry: &FrameEntry| read_depth(companion(entry), size, metres_per_unit, &mut bytes);
-                Companions::Depth(Lane::start("yfslam-depth", entries.clone(), look_ahead, read)?)
+                let read = move |entry: &FrameEntry| read_depth(paired_path(entry), size, metres_per_unit, &mut bytes);
+                PairedImages::Depth(PrefetchQueue::start("yfslam-depth", entries.clone(), look_ahead, read)?)
             }
             DepthSource::Stereo => {
-                let read = move |entry: &FrameEntry| read_right.read(companion(entry), StereoRectification::right);
-                Companions::Right(Lane::start("yfslam-right", entries.clone(), look_ahead, read)?, no_depth())
+                let read = move |entry: &FrameEntry| read_right.read(paired_path(entry), StereoRectification::right);
+                PairedImages::Right(
+                    PrefetchQueue::start("yfslam-right", entries.clone(), look_ahead, read)?,
+                    no_depth(),
+                )
             }
-            DepthSource::Motion => Companions::None(no_depth()),
+            DepthSource::Motion => PairedImages::None(no_depth()),
         };
-        Ok(Self { entries, next: 0, color, companions, times: DecodeTimes::default() })
+        Ok(Self { entries, next: 0, color, paired_images, times: DecodeTimes::default() })
     }
 
-    /// What comes with the colour images.
-    pub fn companion(&self) -> DepthSource {
-        match self.companions {
-            Companions::Depth(_) => DepthSource::Image,
-            Companions::Right(..) => DepthSource::Stereo,
-            Companions::None(_) => DepthSource::Motion,
+    /// Returns the source of depth of the frames.
+    pub fn depth_source(&self) -> DepthSource {
+        match self.paired_images {
+            PairedImages::Depth(_) => DepthSource::Image,
+            PairedImages::Right(..) => DepthSource::Stereo,
+            PairedImages::None(_) => DepthSource::Motion,
         }
     }
 
-    /// Time spent on the frames delivered so far.
+    /// Returns the time spent on the frames delivered so far.
     pub fn times(&self) -> DecodeTimes {
         self.times
     }
@@ -108,14 +110,14 @@ impl Iterator for FrameStream {
         let entry = self.entries.get(index)?;
         let timestamp_ns = entry.timestamp_ns;
         self.next += 1;
-        let asked = Instant::now();
+        let started = Instant::now();
         let color = self.color.next();
-        let (companion, took) = self.companions.next();
-        self.times.waited += asked.elapsed();
+        let (paired, took) = self.paired_images.next();
+        self.times.waited += started.elapsed();
         self.times.color += color.took;
-        self.times.companion += took;
+        self.times.paired_image += took;
         let frame = color.image.and_then(|color| {
-            let (depth, right) = companion?;
+            let (depth, right) = paired?;
             Ok(RgbdFrame { timestamp_ns, color, depth, right, detections: None, mask: None })
         });
         Some(frame.map_err(|fault| FrameError { index, timestamp_ns, fault }))
@@ -129,19 +131,19 @@ impl Iterator for FrameStream {
 
 impl ExactSizeIterator for FrameStream {}
 
-/// A depth image, and a right picture if there is one.
-type Companion = (Arc<DepthImage>, Option<Arc<RgbImage>>);
+/// A depth image and, from a stereo camera, a right image.
+type DepthAndRight = (Arc<DepthImage>, Option<Arc<RgbImage>>);
 
-impl Companions {
-    /// Waits for the next, and says what it took.
-    fn next(&mut self) -> (std::result::Result<Companion, FrameFault>, Duration) {
+impl PairedImages {
+    /// Returns the next image and the time for reading and decoding it; waits until it is decoded.
+    fn next(&mut self) -> (std::result::Result<DepthAndRight, FrameFault>, Duration) {
         match self {
-            Self::Depth(lane) => {
-                let Decoded { image, took } = lane.next();
+            Self::Depth(queue) => {
+                let Decoded { image, took } = queue.next();
                 (image.map(|depth| (depth, None)), took)
             }
-            Self::Right(lane, no_depth) => {
-                let Decoded { image, took } = lane.next();
+            Self::Right(queue, no_depth) => {
+                let Decoded { image, took } = queue.next();
                 (image.map(|right| (no_depth.clone(), Some(right))), took)
             }
             Self::None(no_depth) => (Ok((no_depth.clone(), None)), Duration::ZERO),
@@ -149,15 +151,15 @@ impl Companions {
     }
 }
 
-/// Reads colour or grey pictures, and rectifies them where that is due.
+/// Reads colour or grey images and rectifies them if necessary.
 #[derive(Clone)]
-struct PictureReader {
+struct ColorReader {
     size: ImageSize,
     bytes: Vec<u8>,
     rectification: Option<Arc<StereoRectification>>,
 }
 
-impl PictureReader {
+impl ColorReader {
     fn read(
         &mut self,
         path: &Path,
@@ -185,9 +187,9 @@ fn read_depth(
     Ok(image)
 }
 
-/// The companion's file; where the sequence has none, reading it says so.
-fn companion(entry: &FrameEntry) -> &Path {
-    entry.companion.as_ref().map_or(Path::new(""), |companion| &companion.path)
+/// Returns the path of the paired image; it is empty, which gives an error on reading, if there is none.
+fn paired_path(entry: &FrameEntry) -> &Path {
+    entry.paired_image.as_ref().map_or(Path::new(""), |paired| &paired.path)
 }
 
 fn read(path: &Path, bytes: &mut Vec<u8>) -> std::result::Result<(), FrameFault> {

@@ -1,4 +1,4 @@
-//! Writes files whole or not at all.
+//! The products of a run as files: recordings, point clouds, meshes, octrees, occupancy grids, images.
 
 mod nav2;
 mod octomap;
@@ -7,113 +7,9 @@ mod ply;
 mod png;
 mod recording;
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-
-use crate::error::{Error, Result};
 pub use nav2::write_nav2;
 pub use octomap::{OctreeFormat, OctreeSize, OctreeVoxel, write_octomap};
 pub use pcd::write_pcd;
 pub use ply::{Labels, PlyPoint, write_ply, write_ply_mesh};
 pub use png::{write_color_png, write_depth_png, write_mask_png};
 pub use recording::{ListedStamps, RecordingWriter};
-
-/// Writes `path` by `write`: into a temporary file beside it that takes its place once all of it is on the disk.
-///
-/// Missing folders are made. If anything fails, what stood at `path` stays and no part of the new file is left. A link is followed;
-/// a device or pipe is written directly.
-///
-/// # Errors
-/// [`Error::Write`], also for whatever error `write` returns.
-pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
-    write_or_io_error(path, write).map_err(|source| Error::write(path, source))
-}
-
-fn write_or_io_error(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let target = match fs::metadata(path) {
-        Ok(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
-        Ok(metadata) if !metadata.is_file() => return write_through(OpenOptions::new().write(true).open(path)?, write),
-        Ok(_) => path.canonicalize()?,
-        Err(_) => path.to_owned(),
-    };
-    let folder = match target.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    fs::create_dir_all(folder)?;
-    let (temporary, file) = Temporary::create(folder)?;
-    write_through(file, write)?;
-    temporary.rename_to(&target)?;
-    // The new name itself is safe once the folder is; file systems that cannot do this lose nothing else.
-    let _ = File::open(folder).and_then(|folder| folder.sync_all());
-    Ok(())
-}
-
-fn write_through(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let is_regular = file.metadata()?.is_file();
-    let mut writer = BufWriter::with_capacity(1 << 16, file);
-    write(&mut writer)?;
-    let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
-    if is_regular { file.sync_all() } else { Ok(()) }
-}
-
-/// A temporary file or folder that is removed unless it was renamed, also when its writer panics.
-#[derive(Debug)]
-struct Temporary(PathBuf);
-
-impl Temporary {
-    fn create(folder: &Path) -> io::Result<(Self, File)> {
-        Self::claim(folder, |path| OpenOptions::new().write(true).create_new(true).open(path))
-    }
-
-    fn create_folder(folder: &Path) -> io::Result<Self> {
-        Ok(Self::claim(folder, |path| fs::create_dir(path))?.0)
-    }
-
-    /// Moves what stands at `path` to a temporary name beside it.
-    fn aside(path: &Path) -> io::Result<Self> {
-        let path = path.canonicalize()?;
-        let aside = Self::create_folder(path.parent().unwrap_or(Path::new(".")))?;
-        fs::rename(&path, &aside.0)?;
-        Ok(aside)
-    }
-
-    /// Takes a name that nobody has.
-    fn claim<T>(folder: &Path, take: impl Fn(&Path) -> io::Result<T>) -> io::Result<(Self, T)> {
-        static COUNTER: AtomicU64 = AtomicU64::new(0);
-        loop {
-            let number = COUNTER.fetch_add(1, Ordering::Relaxed);
-            let path = folder.join(format!(".yfslam-{}-{number}.tmp", std::process::id()));
-            match take(&path) {
-                Ok(taken) => return Ok((Self(path), taken)),
-                // Left behind by a process of the same number that was killed.
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(error),
-            }
-        }
-    }
-
-    fn path(&self) -> &Path {
-        &self.0
-    }
-
-    fn rename_to(mut self, target: &Path) -> io::Result<()> {
-        fs::rename(&self.0, target)?;
-        self.0.clear();
-        Ok(())
-    }
-}
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        if !self.0.as_os_str().is_empty() {
-            // One of them it is.
-            let _ = fs::remove_file(&self.0).or_else(|_| fs::remove_dir_all(&self.0));
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests;

@@ -1,14 +1,13 @@
-//! Occupancy grids as ROS's navigation reads them: a grey picture and its description (nav2_map_server, map_server).
+//! Occupancy grids for the navigation of ROS (nav2_map_server, map_server): a grey image and its description.
 //!
-//! In: a grid. Out: `NAME.pgm`, whose first row is the farthest along y, and `NAME.yaml`. Black is occupied, nearly white is free, and the
-//! grey of 205 is unknown.
+//! In: a grid. Out: `NAME.pgm`, whose first row has the largest y, and `NAME.yaml`. Occupied is black (0), free is 254, unknown is 205.
 
 use std::path::Path;
 
 use yfslam::dense::grid::{GridCell, GroundGrid};
 
+use crate::atomic_file::write_atomically;
 use crate::error::Result;
-use crate::write::write_atomically;
 
 /// Writes `path` (`.pgm`) and the `.yaml` beside it.
 ///
@@ -26,7 +25,7 @@ pub fn write_nav2(path: &Path, grid: &GroundGrid) -> Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let [x, y] = grid.origin_m;
     write_atomically(&path.with_extension("yaml"), |writer| {
-        // 205 is (255 - 205) / 255 = 0.19608 occupied: not below the threshold of free, which others than 0.196 would make it.
+        // The grey level 205 is read as (255 - 205) / 255 = 0.19608, which must not be below the threshold of free space.
         write!(
             writer,
             "image: {name}\nmode: trinary\nresolution: {}\norigin: [{x}, {y}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
@@ -48,15 +47,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_row_is_the_farthest_and_each_shade_means_what_map_server_takes_it_for() {
+    fn the_first_row_has_the_largest_y_and_map_server_reads_each_grey_level_as_meant() {
         use GridCell::{Free, Occupied, Unknown};
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("grid.pgm");
         let cells = vec![Free, Occupied, Unknown, Free, Free, Unknown];
         let grid = GroundGrid { origin_m: [-1.5, 2.0], resolution_m: 0.05, width: 3, height: 2, cells };
         write_nav2(&path, &grid).unwrap();
-        let picture = std::fs::read(&path).unwrap();
-        assert_eq!(picture, [b"P5\n3 2\n255\n".as_slice(), &[254, 254, 205, 254, 0, 205]].concat());
+        let image = std::fs::read(&path).unwrap();
+        assert_eq!(image, [b"P5\n3 2\n255\n".as_slice(), &[254, 254, 205, 254, 0, 205]].concat());
         let yaml = std::fs::read_to_string(folder.path().join("grid.yaml")).unwrap();
         let value = |key: &str| yaml.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(": ")).unwrap();
         assert_eq!((value("image"), value("resolution"), value("origin")), ("grid.pgm", "0.05", "[-1.5, 2, 0.0]"));

@@ -1,16 +1,16 @@
-//! Occupancy octrees as OctoMap reads them (Hornung et al., Autonomous Robots 2013; formats as its documentation has them).
+//! Occupancy octrees for OctoMap (Hornung et al., Autonomous Robots 2013; the formats follow its documentation).
 //!
-//! In: blocks of voxels with log-odds. Out: `.ot`, which keeps the log-odds, with colours or without, or `.bt`, which keeps free or occupied. Eight
-//! leaves that say the same become one. Of the tree only what is above blocks is held in memory: a map of a building in voxels of a
-//! centimetre has hundreds of millions of nodes.
+//! In: blocks of voxels with log-odds. Out: `.ot` with log-odds and, optionally, colours, or `.bt` with free or occupied. Eight equal
+//! leaves become one. Only the part of the tree above the blocks is kept in memory: a map of a building with voxels of a centimetre has
+//! hundreds of millions of nodes.
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use yfslam::dense::voxels::{Block, SIDE, Voxel};
 
+use crate::atomic_file::write_atomically;
 use crate::error::Result;
-use crate::write::write_atomically;
 
 /// Levels of the tree below its root; keys have as many bits.
 const DEPTH: u32 = 16;
@@ -18,18 +18,18 @@ const DEPTH: u32 = 16;
 /// A voxel for an octree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OctreeVoxel {
-    /// Lower corner, in voxels from the origin.
+    /// Lower corner, voxels from the origin.
     pub voxel: [i32; 3],
-    /// Log-odds of its being occupied.
+    /// Log-odds of occupancy.
     pub log_odds: f32,
-    /// Red, green, blue; for [`OctreeFormat::Colors`] alone.
+    /// Red, green, blue; for [`OctreeFormat::Colors`] only.
     pub color: [u8; 3],
 }
 
-/// What a file keeps.
+/// Format of an octree file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OctreeFormat {
-    /// `.bt`: free or occupied, two bits a node.
+    /// `.bt`: free or occupied, two bits per node.
     Binary,
     /// `.ot`: log-odds.
     LogOdds,
@@ -37,38 +37,38 @@ pub enum OctreeFormat {
     Colors,
 }
 
-/// How many nodes a file has.
+/// Number of nodes of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OctreeSize {
     /// All nodes.
     pub nodes: usize,
-    /// Those without children.
+    /// Nodes without children.
     pub leaves: usize,
 }
 
-/// What is known of a node: its log-odds, and its colour where the format has any.
-type Known = (f32, [u8; 3]);
+/// Content of a node: log-odds, and colour if the format has colours.
+type Content = (f32, [u8; 3]);
 
-/// A node with what hangs below it.
+/// A node with its descendants.
 enum Node {
-    Leaf(Known),
-    /// Greatest log-odds and mean colour below, and the children: x is bit 0 of their number, y bit 1, z bit 2.
-    Inner(Known, Box<[Option<Node>; 8]>),
-    /// The same for a block and how many nodes it has; its voxels are asked for again when it is written.
-    Block(Known, Block, OctreeSize),
+    Leaf(Content),
+    /// Greatest log-odds and mean colour of the descendants, and the children: x is bit 0 of their number, y bit 1, z bit 2.
+    Inner(Content, Box<[Option<Node>; 8]>),
+    /// The content of a whole block and its number of nodes; its voxels are requested again when it is written.
+    Block(Content, Block, OctreeSize),
 }
 
-/// Voxels, block by block, as a format has them.
+/// Voxels by block, in a format.
 struct Blocks<F> {
     voxels: F,
     format: OctreeFormat,
 }
 
-/// Writes voxels as an octree. `voxels(block)` gives those in one of `blocks`; it is asked twice for each, so that not all of the tree is
-/// held at once.
+/// Writes voxels as an octree. `voxels(block)` returns those in one of `blocks`; it is called twice for each block, so that the tree is
+/// never in memory as a whole.
 ///
 /// # Errors
-/// The file cannot be written, or a voxel is outside what 16 levels hold: 32768 voxels around the origin.
+/// The file cannot be written, or a voxel is outside the 16 levels of the tree: more than 32768 voxels from the origin.
 pub fn write_octomap<I: Iterator<Item = OctreeVoxel>>(
     path: &Path,
     resolution_m: f64,
@@ -101,7 +101,7 @@ pub fn write_octomap<I: Iterator<Item = OctreeVoxel>>(
     Ok(size)
 }
 
-/// Place on the curve that visits children before going on: bits of x, y and z interleaved.
+/// Returns the Morton code of a voxel: the bits of x, y and z interleaved.
 fn code_of(voxel: Voxel) -> io::Result<u64> {
     let mut code = 0;
     for (axis, v) in voxel.into_iter().enumerate() {
@@ -117,11 +117,11 @@ fn code_of(voxel: Voxel) -> io::Result<u64> {
 }
 
 impl<I: Iterator<Item = OctreeVoxel>, F: Fn(Block) -> I> Blocks<F> {
-    /// The node of a block; `None` if nothing is known of it.
+    /// Builds the node of a block; `None` if it has no voxels.
     fn node(&self, block: Block) -> io::Result<Option<Node>> {
         let mut coded = Vec::with_capacity((SIDE * SIDE * SIDE) as usize);
         for OctreeVoxel { voxel, log_odds, color } in (self.voxels)(block) {
-            // A binary tree keeps which side of even odds, and is pruned accordingly.
+            // A binary tree distinguishes free and occupied only and is pruned accordingly.
             let known = match self.format {
                 OctreeFormat::Binary if log_odds > 0.0 => (1.0, [0; 3]),
                 OctreeFormat::Binary => (-1.0, [0; 3]),
@@ -138,7 +138,7 @@ impl<I: Iterator<Item = OctreeVoxel>, F: Fn(Block) -> I> Blocks<F> {
     fn write(&self, node: &Node, writer: &mut dyn Write) -> io::Result<()> {
         match (node, self.format) {
             (Node::Block(_, block, _), _) => self.node(*block)?.map_or(Ok(()), |node| self.write(&node, writer)),
-            // A binary tree says of leaves in their parent what they are, and cannot say that the whole world is alike.
+            // In a binary tree a leaf is described by its parent; a root that is a leaf cannot be described.
             (Node::Leaf(_), OctreeFormat::Binary) => Ok(()),
             (Node::Inner(_, children), OctreeFormat::Binary) => {
                 writer.write_all(&children_word(children).to_le_bytes())?;
@@ -153,8 +153,8 @@ impl<I: Iterator<Item = OctreeVoxel>, F: Fn(Block) -> I> Blocks<F> {
         }
     }
 
-    /// Log-odds, perhaps the colour, then a bit for each child.
-    fn write_known(&self, (log_odds, color): Known, children: u8, writer: &mut dyn Write) -> io::Result<()> {
+    /// Writes the log-odds, the colour if the format has colours, and one bit for each child.
+    fn write_known(&self, (log_odds, color): Content, children: u8, writer: &mut dyn Write) -> io::Result<()> {
         writer.write_all(&log_odds.to_le_bytes())?;
         if self.format == OctreeFormat::Colors {
             writer.write_all(&color)?;
@@ -163,24 +163,24 @@ impl<I: Iterator<Item = OctreeVoxel>, F: Fn(Block) -> I> Blocks<F> {
     }
 }
 
-/// Two bits for each child: 0 unknown, 1 free, 2 occupied, 3 more below.
+/// Returns two bits for each child: 0 unknown, 1 free, 2 occupied, 3 inner node.
 fn children_word(children: &[Option<Node>; 8]) -> u16 {
     children.iter().enumerate().fold(0, |word, (number, child)| {
-        let says = match child {
+        let bits = match child {
             None => 0,
             Some(Node::Leaf((log_odds, _))) if *log_odds > 0.0 => 2,
             Some(Node::Leaf(_)) => 1,
             Some(Node::Inner(..) | Node::Block(..)) => 3,
         };
-        word | says << (2 * number)
+        word | bits << (2 * number)
     })
 }
 
 impl Node {
-    /// The node over voxels of a block in the order of their codes, `level` levels above them.
-    fn of(voxels: &[(u64, Known)], level: u32) -> Self {
+    /// Builds the node `level` levels above voxels of a block, which are in the order of their codes.
+    fn of(voxels: &[(u64, Content)], level: u32) -> Self {
         if level == 0 {
-            return Self::Leaf(voxels.first().map_or_else(Known::default, |(_, known)| *known));
+            return Self::Leaf(voxels.first().map_or_else(Content::default, |(_, known)| *known));
         }
         let mut rest = voxels;
         Self::over(std::array::from_fn(|number| {
@@ -190,7 +190,7 @@ impl Node {
         }))
     }
 
-    /// The node over blocks in the order of their codes, which it takes; `None` over none.
+    /// Builds the node above blocks, which are in the order of their codes, and takes them; `None` without blocks.
     fn above(mut rest: &mut [(u64, Option<Self>)], level: u32) -> Option<Self> {
         if level == SIDE.ilog2() || rest.is_empty() {
             return rest.first_mut().and_then(|(_, node)| node.take());
@@ -203,14 +203,14 @@ impl Node {
         })))
     }
 
-    /// The node over these children: eight leaves that are alike become one.
+    /// Builds the node above `children`: eight equal leaves become one.
     fn over(children: [Option<Self>; 8]) -> Self {
         let first = match &children[0] {
             Some(Self::Leaf(known)) => Some(*known),
             _ => None,
         };
-        let alike = |child: &Option<Self>| matches!((child, first), (Some(Self::Leaf(a)), Some(b)) if *a == b);
-        if let Some(known) = first.filter(|_| children.iter().all(alike)) {
+        let is_equal = |child: &Option<Self>| matches!((child, first), (Some(Self::Leaf(a)), Some(b)) if *a == b);
+        if let Some(known) = first.filter(|_| children.iter().all(is_equal)) {
             return Self::Leaf(known);
         }
         let known = || children.iter().flatten().map(Self::known);
@@ -219,14 +219,14 @@ impl Node {
         Self::Inner((most, [0, 1, 2].map(|axis| mean(axis) as u8)), Box::new(children))
     }
 
-    /// A block's node without what hangs below it.
+    /// Replaces an inner node of a block by its summary without descendants.
     fn summary(self, block: Block) -> Self {
         let mut size = OctreeSize::default();
         self.count(&mut size);
         if let Self::Inner(known, _) = self { Self::Block(known, block, size) } else { self }
     }
 
-    fn known(&self) -> Known {
+    fn known(&self) -> Content {
         match self {
             Self::Leaf(known) | Self::Inner(known, _) | Self::Block(known, ..) => *known,
         }
@@ -250,7 +250,7 @@ impl Node {
     }
 }
 
-/// How many of these codes, which are in order, are in the children up to `number` of a node of that level.
+/// Counts the codes, which are sorted, that belong to the children up to `number` of a node at `level`.
 fn count_below<T>(sorted: &[(u64, T)], level: u32, number: usize) -> usize {
     sorted.partition_point(|(code, _)| (code >> (3 * (level - 1)) & 7) as usize <= number)
 }

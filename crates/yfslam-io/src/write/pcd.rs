@@ -3,8 +3,9 @@
 use std::io;
 use std::path::Path;
 
+use super::{Labels, PlyPoint};
+use crate::atomic_file::write_atomically;
 use crate::error::Result;
-use crate::write::{Labels, PlyPoint, write_atomically};
 
 /// Writes `points` as PCD with fields x, y, z (m) and rgb (packed as PCL packs it), and label (the class) with labels.
 ///

@@ -3,8 +3,8 @@
 use std::io;
 use std::path::Path;
 
+use crate::atomic_file::write_atomically;
 use crate::error::Result;
-use crate::write::write_atomically;
 
 /// A coloured point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,16 +15,16 @@ pub struct PlyPoint {
     pub color: [u8; 3],
 }
 
-/// What points show.
+/// Classes of points.
 #[derive(Clone, Copy, Debug)]
 pub struct Labels<'a> {
-    /// The class of each point, 0 where it is unknown.
+    /// Class of each point, 0 if it is unknown.
     pub classes: &'a [u8],
-    /// Names of the classes, from class 1 on.
+    /// Names of the classes, starting with class 1.
     pub names: &'a [String],
 }
 
-/// Writes `points` as PLY, with labels as a property `class`, whose names stand in comments.
+/// Writes `points` as PLY; labels become a property `class`, and their names comments in the header.
 ///
 /// # Errors
 /// The file cannot be written, or a position is not finite.
@@ -35,7 +35,7 @@ where
     write(path, points.into_iter(), labels, &[])
 }
 
-/// Writes a mesh as PLY: coloured vertices, and triangles as numbers of three of them.
+/// Writes a mesh as PLY: coloured vertices, and triangles as indices of three vertices.
 ///
 /// # Errors
 /// The file cannot be written, or a position is not finite.
@@ -55,7 +55,7 @@ fn write(
     write_atomically(path, |writer| {
         writer.write_all(b"ply\nformat binary_little_endian 1.0\n")?;
         for (class, name) in labels.iter().flat_map(|labels| (1..).zip(labels.names)) {
-            // A line of its own for each, whatever a name holds.
+            // Without control characters each name takes one line.
             writeln!(writer, "comment class {class} {}", name.replace(char::is_control, " "))?;
         }
         write!(

@@ -1,4 +1,4 @@
-//! Pictures as PNG: colour for people, 16-bit depth for programs. Compressed fast rather than small.
+//! Writes colour, depth and mask images as PNG, with fast compression.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -6,8 +6,8 @@ use std::path::Path;
 use png::{BitDepth, ColorType, Compression, Encoder};
 use yfslam::image::{Image, RgbImage};
 
+use crate::atomic_file::write_atomically;
 use crate::error::Result;
-use crate::write::write_atomically;
 
 /// Writes an 8-bit RGB PNG.
 ///
@@ -17,7 +17,7 @@ pub fn write_color_png(path: &Path, image: &RgbImage) -> Result<()> {
     write_atomically(path, |writer| encode_color(image, writer))
 }
 
-/// Writes depth in sensor units as a 16-bit grey PNG, the form in which TUM and Bonn recordings keep it.
+/// Writes depth in sensor units as a 16-bit grey PNG, like the recordings of TUM and Bonn.
 ///
 /// # Errors
 /// The file cannot be written, or the image is empty.
@@ -43,7 +43,7 @@ pub(super) fn encode_depth(depth: &Image<u16>, writer: &mut dyn Write) -> io::Re
     encode((depth.width(), depth.height()), (ColorType::Grayscale, BitDepth::Sixteen), &bytes, writer)
 }
 
-/// A mask: 8-bit grey, the value is the instance.
+/// Encodes a mask as 8-bit grey; the value is the instance.
 pub(super) fn encode_mask(mask: &Image<u8>, writer: &mut dyn Write) -> io::Result<()> {
     encode((mask.width(), mask.height()), (ColorType::Grayscale, BitDepth::Eight), mask.data(), writer)
 }
@@ -70,9 +70,9 @@ mod tests {
     use crate::decode::{decode_color, decode_depth};
 
     #[test]
-    fn written_pictures_decode_to_the_same_pixels() {
+    fn written_images_decode_to_the_same_pixels() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("picture.png");
+        let path = folder.path().join("image.png");
         let color = RgbImage::from_vec(5, 3, (0..15u8).map(|i| [i, 255 - i, i * 7]).collect()).unwrap();
         write_color_png(&path, &color).unwrap();
         let mut again = RgbImage::default();
@@ -87,10 +87,10 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_picture_is_refused_and_nothing_is_written() {
+    fn an_empty_image_is_refused_and_nothing_is_written() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("picture.png");
-        assert!(write_color_png(&path, &RgbImage::default()).unwrap_err().to_string().contains("picture.png"));
+        let path = folder.path().join("image.png");
+        assert!(write_color_png(&path, &RgbImage::default()).unwrap_err().to_string().contains("image.png"));
         assert!(!path.exists());
     }
 }

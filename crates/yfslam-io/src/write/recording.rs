@@ -1,8 +1,8 @@
-//! A recording in TUM layout, written whole or not at all.
+//! Writes a recording in TUM layout, completely or not at all.
 //!
-//! In: frames with their numbers, boxes, masks, the true poses. Out: a folder with `rgb/`, `depth/`, `masks/`, their lists,
-//! `associations.txt`, `groundtruth.txt`, `camera.toml`, `boxes.json`, which [`Sequence::open`](crate::Sequence::open) reads; of a stereo
-//! camera with `right/` and `right.txt` in place of depth.
+//! In: frames with their numbers, boxes, masks, ground truth. Out: a folder with `rgb/`, `depth/`, `masks/`, their lists,
+//! `associations.txt`, `groundtruth.txt`, `camera.toml` and `boxes.json`, which [`Sequence::open`](crate::Sequence::open) reads; for a
+//! stereo camera with `right/` and `right.txt` instead of depth.
 
 use std::fmt::Write as _;
 use std::fs::{self, File};
@@ -12,39 +12,39 @@ use std::path::{Path, PathBuf};
 use yfslam::image::Image;
 use yfslam::{Camera, RgbdFrame};
 
-use super::Temporary;
 use super::png::{encode_color, encode_depth, encode_mask};
+use crate::atomic_file::Temporary;
 use crate::boxes::{BOXES_FILE, BoxList};
 use crate::error::{Error, Result};
 use crate::time::format_stamp;
 use crate::trajectory::{StampedPose, write_trajectory};
 
-/// A recording in the making, in a temporary folder beside its place.
+/// A recording that is being written to a temporary folder beside its target.
 #[derive(Debug)]
 pub struct RecordingWriter {
     temporary: Temporary,
     target: PathBuf,
     replace: bool,
-    /// Whether right pictures come in place of depth images.
+    /// Whether right images are written instead of depth images.
     stereo: bool,
     lists: [String; 3],
 }
 
-/// Stamps of one frame as the lists say them.
+/// Stamps of one frame in the lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ListedStamps {
     /// Time of the colour image, ns; `None` is written as `nan`.
     pub color_ns: Option<i64>,
-    /// Time of the depth image or right picture, ns.
-    pub companion_ns: Option<i64>,
+    /// Time of the depth or right image, ns.
+    pub paired_ns: Option<i64>,
 }
 
 impl RecordingWriter {
-    /// Begins the recording `target`, of right pictures in place of depth images if `stereo` is set. A folder that holds something is
-    /// refused, unless `replace` is set and it is a recording itself.
+    /// Begins the recording `target`, with right images instead of depth images if `stereo` is set. A folder that is not empty is
+    /// refused, unless `replace` is set and it is a recording.
     ///
     /// # Errors
-    /// The folder is in use, or nothing can be written beside it.
+    /// The folder is refused, or nothing can be written beside it.
     pub fn create(target: &Path, stereo: bool, replace: bool) -> Result<Self> {
         let occupied = match fs::read_dir(target) {
             Ok(mut entries) => entries.next().is_some(),
@@ -52,17 +52,17 @@ impl RecordingWriter {
             Err(error) => return Err(Error::write(target, error)),
         };
         if occupied && !replace {
-            return Err(Error::content(target, "holds something already", "choose another folder, or give --force"));
+            return Err(Error::content(target, "is not empty", "choose another folder, or give --force"));
         }
         if occupied && !target.join("rgb.txt").is_file() {
-            let problem = "is no recording and will not be replaced";
+            let problem = "is not a recording and is therefore not replaced";
             return Err(Error::content(target, problem, "choose another folder, or remove it by hand"));
         }
         let begin = || {
             let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
             fs::create_dir_all(parent)?;
             let temporary = Temporary::create_folder(parent)?;
-            for part in ["rgb", companion_folder(stereo), "masks"] {
+            for part in ["rgb", paired_folder(stereo), "masks"] {
                 fs::create_dir(temporary.path().join(part))?;
             }
             Ok(temporary)
@@ -72,20 +72,20 @@ impl RecordingWriter {
         Ok(Self { temporary, target: target.into(), replace: occupied, stereo, lists: lists.map(str::to_owned) })
     }
 
-    /// Writes the images of delivery `number`; any order, any thread.
+    /// Writes the images of delivery `number`, in any order and from any thread.
     ///
     /// # Errors
-    /// A file cannot be written, or an image is empty or not there.
+    /// A file cannot be written, or an image is empty or missing.
     pub fn write_images(&self, number: usize, frame: &RgbdFrame) -> Result<()> {
         self.write_file(&color_name(number), |file| encode_color(&frame.color, file))?;
-        self.write_file(&self.companion_name(number), |file| match &frame.right {
+        self.write_file(&self.paired_name(number), |file| match &frame.right {
             Some(right) if self.stereo => encode_color(right, file),
-            None if self.stereo => Err(io::Error::new(io::ErrorKind::InvalidData, "the frame has no right picture")),
+            None if self.stereo => Err(io::Error::new(io::ErrorKind::InvalidData, "the frame has no right image")),
             _ => encode_depth(&frame.depth.raw, file),
         })
     }
 
-    /// Writes the mask of instances of the frame with this stamp; any order, any thread.
+    /// Writes the mask of instances of the frame with this stamp, in any order and from any thread.
     ///
     /// # Errors
     /// The file cannot be written, or the image is empty.
@@ -93,16 +93,16 @@ impl RecordingWriter {
         self.write_file(&format!("masks/{}.png", format_stamp(timestamp_ns)), |file| encode_mask(mask, file))
     }
 
-    /// Lists delivery `number`, after those listed before.
+    /// Appends delivery `number` to the lists.
     pub fn list(&mut self, number: usize, stamps: ListedStamps) {
         let text = |stamp: Option<i64>| stamp.map_or("nan".to_owned(), format_stamp);
-        let (color, companion) = (text(stamps.color_ns), text(stamps.companion_ns));
-        let (color_file, companion_file) = (color_name(number), self.companion_name(number));
-        let [color_list, companion_list, pairs] = &mut self.lists;
+        let (color, paired) = (text(stamps.color_ns), text(stamps.paired_ns));
+        let (color_file, paired_file) = (color_name(number), self.paired_name(number));
+        let [color_list, paired_list, pairs] = &mut self.lists;
         // Writing to a string cannot fail.
         let _ = writeln!(color_list, "{color} {color_file}");
-        let _ = writeln!(companion_list, "{companion} {companion_file}");
-        let _ = writeln!(pairs, "{color} {color_file} {companion} {companion_file}");
+        let _ = writeln!(paired_list, "{paired} {paired_file}");
+        let _ = writeln!(pairs, "{color} {color_file} {paired} {paired_file}");
     }
 
     /// Adds a text file.
@@ -113,14 +113,14 @@ impl RecordingWriter {
         self.write_file(name, |file| file.write_all(text.as_bytes()))
     }
 
-    /// Writes the lists and puts the folder in its place.
+    /// Writes the lists and moves the folder to its target.
     ///
     /// # Errors
-    /// A file cannot be written, or the folder cannot be moved to its place.
+    /// A file cannot be written, or the folder cannot be moved.
     pub fn finish(self, camera: &Camera, truth: &[StampedPose], boxes: &BoxList) -> Result<()> {
-        let [color, companions, pairs] = &self.lists;
+        let [color, paired, pairs] = &self.lists;
         self.write_text("rgb.txt", color)?;
-        self.write_text(&format!("{}.txt", companion_folder(self.stereo)), companions)?;
+        self.write_text(&format!("{}.txt", paired_folder(self.stereo)), paired)?;
         if !self.stereo {
             self.write_text("associations.txt", pairs)?;
         }
@@ -131,7 +131,7 @@ impl RecordingWriter {
         boxes.write(&self.temporary.path().join(BOXES_FILE))?;
         let Self { temporary, target, replace, .. } = self;
         let fail = |error| Error::write(&target, error);
-        // The old recording leaves only once the new one is complete.
+        // The old recording is moved away only once the new one is complete.
         let old = replace.then(|| Temporary::aside(&target)).transpose().map_err(fail)?;
         if let Err(error) = temporary.rename_to(&target) {
             if let Some(old) = old {
@@ -142,11 +142,11 @@ impl RecordingWriter {
         Ok(())
     }
 
-    fn companion_name(&self, number: usize) -> String {
-        format!("{}/{number:06}.png", companion_folder(self.stereo))
+    fn paired_name(&self, number: usize) -> String {
+        format!("{}/{number:06}.png", paired_folder(self.stereo))
     }
 
-    /// One of many files of the temporary folder: the folder as a whole makes it atomic.
+    /// Writes one file of the temporary folder, which is moved as a whole.
     fn write_file(&self, name: &str, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
         let into = || {
             let mut file = BufWriter::with_capacity(1 << 16, File::create(self.temporary.path().join(name))?);
@@ -161,7 +161,7 @@ fn color_name(number: usize) -> String {
     format!("rgb/{number:06}.png")
 }
 
-/// Folder of what comes with the colour images.
-fn companion_folder(stereo: bool) -> &'static str {
+/// Returns the folder of the images that are paired with the colour images.
+fn paired_folder(stereo: bool) -> &'static str {
     if stereo { "right" } else { "depth" }
 }

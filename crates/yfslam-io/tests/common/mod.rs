@@ -1,4 +1,4 @@
-//! Small recorded sequences for tests: written to a temporary folder, or found in the folder that `YFSLAM_DATA` names.
+//! Small recorded sequences for tests, which are written to a temporary folder or read from the folder named by `YFSLAM_DATA`.
 #![allow(dead_code, reason = "each test file uses a part")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
@@ -10,7 +10,7 @@ use yfslam::Camera;
 /// Size of the images of [`write_sequence`], px.
 pub const SIZE: (u32, u32) = (8, 6);
 
-/// A camera that fits [`write_sequence`].
+/// Returns the camera of [`write_sequence`].
 pub fn camera() -> Camera {
     Camera {
         width: SIZE.0 as usize,
@@ -67,7 +67,7 @@ pub fn write_sequence(folder: &Path, count: usize) {
     fs::write(folder.join("depth.txt"), depth).unwrap();
 }
 
-/// A file or folder of the development data, or `None`, having said so.
+/// Returns a file or folder of the development data; prints a message and returns `None` if it is missing.
 pub fn real_data(name: &str) -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let root = std::env::var_os("YFSLAM_DATA").map_or(beside, PathBuf::from);
@@ -75,6 +75,6 @@ pub fn real_data(name: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    println!("skipped: {name} is not in the folder that YFSLAM_DATA names");
+    println!("skipped: {name} is not in the folder named by YFSLAM_DATA");
     None
 }

@@ -1,9 +1,9 @@
-//! A box that is displaced while nobody looks.
+//! A box that is displaced while it is outside the view of the camera.
 //!
-//! In: free places of the scene and the camera's whole path. Out: where the box is at any time. It changes its place at one
-//! moment of the sequence, in the middle of the longest time in which neither the old nor the new place is in view; the
-//! choice is made once, from the path alone, so that a frame still depends on its number only. Without such a moment
-//! before which and after which the place is seen, the box stays.
+//! In: free places of the scene and the whole path of the camera. Out: the place of the box at any time. It changes its place at
+//! one moment of the sequence, in the middle of the longest time in which neither the old nor the new place is in view; the choice
+//! depends on the path alone, so that a frame still depends on its number only. Without such a moment with views before and after
+//! it, the box stays.
 
 use nalgebra::Isometry3;
 
@@ -17,22 +17,22 @@ use crate::scene::Scene;
 
 /// Size: right, forward, up, m.
 pub const BOX_M: [f32; 3] = [0.40, 0.34, 0.46];
-/// How far it is moved, m.
+/// Distance of the displacement, m.
 const MOVED_M: f32 = 0.35;
 /// Steps in which the path is searched.
 const STEPS: usize = 1000;
 
-/// The box's places.
+/// The places of the box.
 #[derive(Clone, Debug)]
-pub struct Displaced {
+pub struct DisplacedBox {
     from: Isometry3<f32>,
     to: Isometry3<f32>,
-    /// When it is displaced, s.
+    /// Time of the displacement, s.
     at: Option<f64>,
 }
 
-impl Displaced {
-    /// Chooses the place with the longest moment out of view.
+impl DisplacedBox {
+    /// Chooses the place with the longest time out of view.
     pub fn new(scene: &Scene, config: &WorldConfig, path: &CameraPath) -> Self {
         let mut rng = Rng::new(config.seed, 0xd15);
         let seconds = config.frames as f64 / config.camera.fps;
@@ -59,7 +59,7 @@ impl Displaced {
         }
         best.map_or_else(
             || {
-                // A scene without free places keeps the box at the middle of its walk.
+                // A scene without free places keeps the box in the middle of its walk.
                 let middle = scene.walk_center.coords.cast::<f32>();
                 let pose = upright([middle.x, middle.y], middle.z, 0.0);
                 Self { from: pose, to: pose, at: None }
@@ -68,13 +68,13 @@ impl Displaced {
         )
     }
 
-    /// Pose at `time` seconds: the middle of its bottom.
+    /// Returns the pose at `time` seconds: the middle of its bottom.
     pub fn at(&self, time: f64) -> Isometry3<f32> {
         if self.at.is_some_and(|at| time >= at) { self.to } else { self.from }
     }
 }
 
-/// Length and middle of the longest run of `false` that has `true` before and after it; at least two long.
+/// Returns the length and middle of the longest run of `false` that has `true` before and after it and is at least two long.
 fn longest_gap(seen: &[bool]) -> (usize, usize) {
     let (mut best, mut start, mut before) = ((0, 0), 0, false);
     for (k, &now) in seen.iter().enumerate() {

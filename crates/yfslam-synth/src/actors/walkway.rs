@@ -1,12 +1,13 @@
-//! The way someone walks: a closed smooth round with stops.
+//! A walking route: a closed smooth circuit with stops.
 //!
-//! In: way-points, stops with the paces to them, and a phase. Out: position, heading, distance walked and speed at any time. The round is a
-//! closed Catmull–Rom spline, walked by arc length; between stops the speed follows a minimum-jerk profile with a plateau.
+//! In: waypoints, stops with the paces to them, and a phase. Out: position, heading, distance walked and speed at any time. The
+//! circuit is a closed Catmull–Rom spline, walked by arc length; between stops the speed follows a minimum-jerk profile with a
+//! plateau.
 
-/// A closed round.
+/// A closed circuit.
 #[derive(Clone, Debug)]
 pub struct Walkway {
-    /// Points on the round, closely spaced, and the arc length up to each; the first point is repeated at the end.
+    /// Points on the circuit, closely spaced, and the arc length up to each; the first point is repeated at the end.
     points: Vec<[f64; 2]>,
     arc: Vec<f64>,
     legs: Vec<Leg>,
@@ -22,7 +23,7 @@ struct Leg {
     walk_time: f64,
     start_arc: f64,
     length: f64,
-    /// Where one looks while standing, relative to the direction of the way, rad.
+    /// Direction of view while standing, relative to the direction of the route, rad.
     glance: f64,
     pause: f64,
     /// Number of the stop at the end.
@@ -32,43 +33,43 @@ struct Leg {
 /// A place to stop at.
 #[derive(Clone, Copy, Debug)]
 pub struct Stop {
-    /// The nearest point of the round is meant, m.
+    /// Place; the stop is at the nearest point of the circuit, m.
     pub near: [f64; 2],
-    /// How long, s; more than 0.
+    /// Duration, s; more than 0.
     pub pause: f64,
-    /// Where one turns meanwhile, relative to the direction of the way, rad.
+    /// Direction of view meanwhile, relative to the direction of the route, rad.
     pub glance: f64,
-    /// Speed on the way to it, m/s.
+    /// Speed on the leg to it, m/s.
     pub pace: f64,
 }
 
-/// Where a walker is.
+/// The state of a walker.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// Position on the floor, m.
     pub position: [f64; 2],
-    /// Direction of the way: angle about +z from +y, rad.
+    /// Direction of the route: angle about +z from +y, rad.
     pub heading: f64,
-    /// Where one looks, relative to that, rad.
+    /// Direction of view, relative to that, rad.
     pub glance: f64,
-    /// Distance walked along the way, counted from somewhere, m.
+    /// Distance walked along the route from an arbitrary origin, m.
     pub distance: f64,
     /// Speed, m/s.
     pub speed: f64,
-    /// Number of legs walked before this one, counted from somewhere; round by round.
+    /// Number of legs walked before this one, from an arbitrary origin, over all rounds.
     pub legs_before: i64,
     /// Time spent at the stop at the end of this leg, s; 0 while walking there.
     pub waited: f64,
-    /// How long one stays there, s.
+    /// Duration of that stop, s.
     pub pause: f64,
 }
 
 const SAMPLES_PER_SPAN: usize = 24;
-/// Moments of a round among which the nearest to a place is sought.
+/// Moments of a round among which the nearest to a place is searched.
 const MOMENTS: usize = 1000;
 
 impl Walkway {
-    /// A round through `waypoints` with at least one stop.
+    /// Creates a circuit through `waypoints` with at least one stop.
     pub fn new(waypoints: &[[f64; 2]], stops: &[Stop], clockwise: bool) -> Self {
         let n = waypoints.len() as isize;
         let at = |i: isize| waypoints[i.rem_euclid(n) as usize];
@@ -98,9 +99,9 @@ impl Walkway {
         for (k, &(start_arc, _)) in halts.iter().enumerate() {
             let (end_arc, index) = halts[(k + 1) % halts.len()];
             let stop = stops[index];
-            // With one stop only, the leg is a full round.
+            // With a single stop, the leg is a full round.
             let length = total - (start_arc - end_arc).rem_euclid(total);
-            // The smooth profile's mean speed is a share 1 - RAMP of its plateau.
+            // The mean speed of the smooth profile is a share 1 - RAMP of its plateau.
             let walk_time = length / (stop.pace * (1.0 - RAMP));
             let (glance, pause) = (stop.glance, stop.pause);
             legs.push(Leg { start_time: time, walk_time, start_arc, length, glance, pause, stop: index });
@@ -109,7 +110,7 @@ impl Walkway {
         Self { points, arc, legs, period: time, phase: 0.0, clockwise }
     }
 
-    /// The same round with the times of `other`, which has as many stops: the two stop and go together.
+    /// Returns the same circuit with the times of `other`, which has as many stops, so that both stop and walk together.
     pub fn in_step_with(mut self, other: &Self) -> Self {
         for (leg, model) in self.legs.iter_mut().zip(&other.legs) {
             (leg.start_time, leg.walk_time, leg.pause) = (model.start_time, model.walk_time, model.pause);
@@ -118,7 +119,7 @@ impl Walkway {
         self
     }
 
-    /// The same round, timed to be nearest to `place` at `time` seconds, and then ahead by `spread` rounds.
+    /// Returns the same circuit, timed to be nearest to `place` at `time` seconds, and then ahead by `spread` rounds.
     pub fn meeting(self, place: [f64; 2], time: f64, spread: f64) -> Self {
         let start = Self { phase: 0.0, ..self };
         let moments = (0..MOMENTS).map(|k| k as f64 * start.period / MOMENTS as f64);
@@ -127,7 +128,7 @@ impl Walkway {
         Self { phase: visit - time + spread * start.period, ..start }
     }
 
-    /// Where the walker is at `time` seconds.
+    /// Returns the state of the walker at `time` seconds.
     pub fn at(&self, time: f64) -> Step {
         let rounds = ((time + self.phase) / self.period).floor();
         let t = (time + self.phase).rem_euclid(self.period);
@@ -152,19 +153,19 @@ impl Walkway {
         }
     }
 
-    /// Legs of a round, and on which of them one walks to stop number `stop`.
+    /// Returns the legs of a round, and the number of the leg that leads to stop number `stop`.
     pub fn leg_to(&self, stop: usize) -> (i64, i64) {
         let leg = self.legs.iter().position(|leg| leg.stop == stop).unwrap_or(0);
         (self.legs.len() as i64, leg as i64)
     }
 
-    /// Position and direction of the way at stop number `stop`.
+    /// Returns the position and direction of the route at stop number `stop`.
     pub fn place_of(&self, stop: usize) -> ([f64; 2], f64) {
         let leg = self.legs[self.leg_to(stop).1 as usize];
         self.locate(leg.start_arc + leg.length)
     }
 
-    /// Whether one walks clockwise, seen from above.
+    /// Returns whether the circuit is clockwise, seen from above.
     pub fn is_clockwise(&self) -> bool {
         self.clockwise
     }
@@ -173,7 +174,7 @@ impl Walkway {
         let total = self.arc[self.arc.len() - 1];
         let along = if self.clockwise { total - arc.rem_euclid(total) } else { arc.rem_euclid(total) };
         let position = self.point(along);
-        // The heading averages over 0.4 m: people turn before the bend.
+        // The heading is averaged over 0.4 m: people turn before the bend.
         let (a, b) = (self.point((along - 0.2).rem_euclid(total)), self.point((along + 0.2).rem_euclid(total)));
         let sign = if self.clockwise { -1.0 } else { 1.0 };
         let (dx, dy) = (sign * (b[0] - a[0]), sign * (b[1] - a[1]));
@@ -188,16 +189,18 @@ impl Walkway {
     }
 }
 
-/// Share of a leg's time spent on speeding up, and as much on slowing down.
+/// Share of the time of a leg for acceleration, and for deceleration.
 const RAMP: f64 = 0.2;
 
-/// Share of a glance after `waited` of `pause` seconds: one turns within a second, stays, and turns back.
+/// Returns the share of a turn of the view after `waited` of `pause` seconds: within a second to the side, then constant, then
+/// back.
 fn turned(waited: f64, pause: f64) -> f64 {
     let t = (waited.min(pause - waited) / (pause / 2.0).min(1.0)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Share of the way and relative speed at share `t` of the time: speed rises as a smoothstep, stays, falls.
+/// Returns the share of the route and the relative speed at share `t` of the time: the speed rises as a smoothstep, is constant,
+/// and falls.
 fn profile(t: f64) -> (f64, f64) {
     let top = 1.0 / (1.0 - RAMP);
     let rising = |t: f64| {
@@ -209,8 +212,8 @@ fn profile(t: f64) -> (f64, f64) {
     } else if t <= 1.0 - RAMP {
         (top * (t - RAMP / 2.0), top)
     } else {
-        let (way, speed) = rising(1.0 - t);
-        (1.0 - way, speed)
+        let (route, speed) = rising(1.0 - t);
+        (1.0 - route, speed)
     }
 }
 
@@ -231,9 +234,10 @@ mod tests {
 
     #[test]
     fn a_walker_moves_without_jumps_at_the_stated_speed_and_stops() {
-        let round = [[2.0, 0.0], [0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]];
+        let waypoints = [[2.0, 0.0], [0.0, 2.0], [-2.0, 0.0], [0.0, -2.0]];
         let stop = |near| Stop { near, pause: 1.5, glance: 0.8, pace: 0.9 };
-        let walkway = Walkway::new(&round, &[stop([0.0, 2.0]), stop([-2.0, 0.1])], true).meeting([0.0, 2.0], 3.0, 0.0);
+        let walkway =
+            Walkway::new(&waypoints, &[stop([0.0, 2.0]), stop([-2.0, 0.1])], true).meeting([0.0, 2.0], 3.0, 0.0);
         let met = walkway.at(3.0);
         assert!(distance(met.position, [0.0, 2.0]) < 0.1 && met.speed < 1e-9, "{met:?}");
         let h = 0.01;
@@ -245,7 +249,7 @@ mod tests {
         for (pair, speed) in steps.windows(2).zip(&speeds) {
             assert!((pair[0].speed - speed).abs() < 0.05, "{} is not {speed}", pair[0].speed);
             let walked = (pair[1].distance - pair[0].distance) / h;
-            assert!((walked - speed).abs() < 0.01, "the way counts {walked} m/s instead of {speed}");
+            assert!((walked - speed).abs() < 0.01, "the distance changes by {walked} m/s instead of {speed}");
             let turn = (pair[1].heading + pair[1].glance - pair[0].heading - pair[0].glance).sin().abs();
             assert!(turn < 0.06, "turns by {turn} rad in {h} s");
         }

@@ -1,7 +1,7 @@
-//! The renderer: meshes and a camera pose in; colour, exact depth and instance mask out.
+//! The renderer. In: meshes and a camera pose. Out: colour, exact depth and instance mask.
 //!
-//! A rasteriser in homogeneous coordinates over a table of viewing rays: [`project`] sets triangles up, [`raster`] finds
-//! the nearest one per pixel, [`shade`] colours a place on it, [`paint`] does so for every pixel.
+//! A rasteriser in homogeneous coordinates over a table of viewing rays: [`project`] sets triangles up, [`raster`] finds the
+//! nearest one per pixel, [`shade`] computes the colour at a place on it, [`paint`] does so for every pixel.
 
 pub mod paint;
 pub mod project;
@@ -20,20 +20,20 @@ use shade::View;
 
 use crate::mesh::Mesh;
 
-/// What the renderer makes of one view; row-major, `width * height` pixels.
+/// The result for one view; row-major, `width * height` pixels.
 #[derive(Clone, Debug, Default)]
-pub struct Picture {
+pub struct Rendering {
     /// Linear RGB, 1 is white.
     pub color: Vec<[f32; 3]>,
-    /// Depth along the optical axis in metres; 0 where nothing is seen.
+    /// Depth along the optical axis, m; 0 where nothing is visible.
     pub depth: Vec<f32>,
     /// 0 static, k actor.
     pub instance: Vec<u8>,
-    /// Share of the projector's infrared light that the surface reflects.
+    /// Share of the infrared light of the projector that the surface reflects.
     pub reflectance: Vec<f32>,
 }
 
-impl Picture {
+impl Rendering {
     fn new(pixels: usize) -> Self {
         Self {
             color: vec![[0.0; 3]; pixels],
@@ -45,29 +45,29 @@ impl Picture {
 }
 
 /// Renders the meshes of `view` from `t_cam_world`.
-pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antialias: bool) -> Picture {
+pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antialias: bool) -> Rendering {
     let triangles = project_all(rays, t_cam_world, view);
     let mut seen = Visibility::empty(rays);
     seen.add(rays, &triangles);
     view.prepare(&triangles, &seen.triangle);
     let painter = Painter { rays, view, triangles: &triangles, seen: &seen, antialias };
-    let bands: Vec<Picture> = (0..rays.bands.len())
+    let bands: Vec<Rendering> = (0..rays.bands.len())
         .into_par_iter()
         .map(|band| {
             let rows = TILE.min(rays.height - band * TILE);
-            let mut out = Picture::new(rows * rays.width);
+            let mut out = Rendering::new(rows * rays.width);
             painter.band(band, &mut out);
             out
         })
         .collect();
-    let mut picture = Picture::new(0);
+    let mut rendering = Rendering::new(0);
     for band in bands {
-        picture.color.extend(band.color);
-        picture.depth.extend(band.depth);
-        picture.instance.extend(band.instance);
-        picture.reflectance.extend(band.reflectance);
+        rendering.color.extend(band.color);
+        rendering.depth.extend(band.depth);
+        rendering.instance.extend(band.instance);
+        rendering.reflectance.extend(band.reflectance);
     }
-    picture
+    rendering
 }
 
 fn project_all(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View) -> Vec<Projected> {
@@ -79,7 +79,7 @@ fn project_all(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View) -> Ve
     triangles
 }
 
-/// The static part of a view, kept to ask again and again how much of it people hide.
+/// The static part of a view, kept to compute repeatedly how much of it people hide.
 #[derive(Clone, Debug)]
 pub struct Backdrop {
     t_cam_world: Isometry3<f64>,
@@ -87,7 +87,7 @@ pub struct Backdrop {
 }
 
 impl Backdrop {
-    /// What the static mesh shows from `t_cam_world`.
+    /// Renders the static mesh from `t_cam_world`.
     pub fn new(rays: &RayTable, t_cam_world: Isometry3<f64>, mesh: &Mesh) -> Self {
         let mut triangles = Vec::new();
         project::project(mesh, 0, &t_cam_world, &rays.view(), &mut triangles);
@@ -97,7 +97,7 @@ impl Backdrop {
         Self { t_cam_world, seen }
     }
 
-    /// Share of pixels that `people` cover.
+    /// Returns the share of pixels that `people` cover.
     pub fn share(&self, rays: &RayTable, people: &Mesh) -> f64 {
         let mut triangles = Vec::new();
         project::project(people, 1, &self.t_cam_world, &rays.view(), &mut triangles);

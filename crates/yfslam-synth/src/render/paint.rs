@@ -1,8 +1,8 @@
-//! Colour of every pixel, tile by tile; pixels on an edge are shaded at four places.
+//! Computes the colour of every pixel, tile by tile; pixels on an edge are shaded at four places.
 //!
-//! In: what each pixel sees. Out: linear RGB, depth and instance per pixel.
+//! In: the visible triangle of each pixel. Out: linear RGB, depth and instance per pixel.
 
-use super::Picture;
+use super::Rendering;
 use super::project::Projected;
 use super::raster::{NOTHING, Visibility};
 use super::rays::{RayTable, TILE};
@@ -12,20 +12,20 @@ use crate::light::Occluder;
 /// Four samples in a rotated grid, in pixels from the centre.
 const SUBSAMPLES: [[f32; 2]; 4] = [[-0.125, -0.375], [0.375, -0.125], [0.125, 0.375], [-0.375, 0.125]];
 
-/// Depth jump between neighbours on one patch that counts as an edge, relative.
+/// Relative depth difference between neighbours on one patch that counts as an edge.
 const DEPTH_JUMP: f32 = 0.03;
 
-/// Reads visibility, writes colours.
+/// Computes colours from visibility.
 pub struct Painter<'a> {
     /// Viewing rays.
     pub rays: &'a RayTable,
     /// Scene.
     pub view: &'a View<'a>,
-    /// Triangles by the index that visibility uses.
+    /// Triangles by the index of visibility.
     pub triangles: &'a [Projected],
-    /// What each pixel sees.
+    /// Visible triangle of each pixel.
     pub seen: &'a Visibility,
-    /// Whether edges are smoothed.
+    /// Whether edges are anti-aliased.
     pub antialias: bool,
 }
 
@@ -34,7 +34,7 @@ type Candidates = ([u32; 9], usize);
 
 impl Painter<'_> {
     /// Paints the band of tiles number `band` into `out`, which holds the band's rows.
-    pub fn band(&self, band: usize, out: &mut Picture) {
+    pub fn band(&self, band: usize, out: &mut Rendering) {
         let (width, rows) = (self.rays.width, out.depth.len() / self.rays.width);
         let mut near = Vec::new();
         for column in (0..width).step_by(TILE) {
@@ -65,7 +65,7 @@ impl Painter<'_> {
         }
     }
 
-    /// The occluders that reach into what the tile sees.
+    /// Collects the occluders that affect the visible part of a tile.
     fn occluders_near(&self, band: usize, column: usize, near: &mut Vec<Occluder>) {
         near.clear();
         if self.view.occluders.is_empty() {
@@ -79,7 +79,7 @@ impl Painter<'_> {
                 (nearest, farthest) = (nearest.min(1.0 / w), farthest.max(1.0 / w));
             }
         }
-        // Box around the visible part of the tile's frustum, in camera coordinates.
+        // Box around the visible part of the frustum of the tile, in camera coordinates.
         let span = |range: [f32; 2]| {
             let ends = [range[0] * nearest, range[0] * farthest, range[1] * nearest, range[1] * farthest];
             [ends.iter().copied().fold(f32::INFINITY, f32::min), ends.iter().copied().fold(f32::NEG_INFINITY, f32::max)]
@@ -91,7 +91,7 @@ impl Painter<'_> {
         }));
     }
 
-    /// The triangles around the pixel if an edge passes near it and edges are to be smoothed.
+    /// Returns the triangles around the pixel if an edge passes near it and edges are anti-aliased.
     fn edge_candidates(&self, row: usize, column: usize) -> Option<Candidates> {
         if !self.antialias {
             return None;
@@ -125,9 +125,9 @@ impl Painter<'_> {
         edge.then_some((list, count))
     }
 
-    /// Colour of an edge pixel: four places decide how much of the pixel each triangle covers, and each triangle is
-    /// shaded once, in the middle of its places (as multisampling hardware does). Places that hit none of the candidates
-    /// count for the triangle at the centre.
+    /// Computes the colour of an edge pixel: four places decide how much of the pixel each triangle covers, and each triangle is
+    /// shaded once, in the middle of its places (as in multisampling hardware). Places that hit none of the candidates count for
+    /// the triangle at the centre.
     fn supersample(&self, index: usize, near: &[Occluder], candidates: &Candidates) -> Shaded {
         let (list, count) = candidates;
         // Per candidate: number of places and their sum, in normalised coordinates.

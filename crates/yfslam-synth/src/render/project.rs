@@ -1,22 +1,21 @@
-//! Triangle set-up: from world vertices to planes over the image that answer "inside?" and "how deep?" for any ray.
+//! Triangle set-up: converts world vertices to planes over the image that give the inside test and the depth for any ray.
 //!
-//! In: a mesh and a camera pose. Out: one [`Projected`] per visible triangle. With the vertices v0, v1, v2 in camera
-//! coordinates and the ray d = (x, y, 1), d lies inside if d·(vⱼ × vₖ) has one sign for all three edges, and 1/z is the
-//! sum of these terms over det(v0, v1, v2): Olano and Greer, "Triangle scan conversion using 2D homogeneous
-//! coordinates", Graphics Hardware 1997, sections 3 and 4. Nothing is clipped and nothing assumes that straight lines
-//! stay straight in the picture, so that lens distortion costs nothing and is exact.
+//! In: a mesh and a camera pose. Out: one [`Projected`] per visible triangle. With the vertices v0, v1, v2 in camera coordinates
+//! and the ray d = (x, y, 1), d lies inside if d·(vⱼ × vₖ) has one sign for all three edges, and 1/z is the sum of these terms over
+//! det(v0, v1, v2): Olano and Greer, "Triangle scan conversion using 2D homogeneous coordinates", Graphics Hardware 1997, sections
+//! 3 and 4. Nothing is clipped and lines need not be straight in the image, so that lens distortion costs nothing and is exact.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::rays::Rect;
 use crate::mesh::Mesh;
 
-/// A triangle as the rasteriser sees it. Planes are `[a, b, c]` for a·x + b·y + c at the ray (x, y, 1).
+/// A triangle for the rasteriser. Planes are `[a, b, c]` for a·x + b·y + c at the ray (x, y, 1).
 #[derive(Clone, Copy, Debug)]
 pub struct Projected {
     /// The three edges; all at least 0 inside. Edge i belongs to the barycentric coordinate of vertex i.
     pub edges: [[f32; 3]; 3],
-    /// Turns an edge value into (barycentric coordinate / z).
+    /// Converts an edge value to (barycentric coordinate / z).
     pub edge_scale: f32,
     /// Inverse depth 1/z.
     pub inverse_depth: [f32; 3],
@@ -39,7 +38,7 @@ pub fn project(mesh: &Mesh, mesh_index: u8, t_cam_world: &Isometry3<f64>, view: 
         let v = triangle.vertices.map(|i| vertices[i as usize]);
         let crosses = [v[1].cross(&v[2]), v[2].cross(&v[0]), v[0].cross(&v[1])];
         let det = v[0].dot(&crosses[0]);
-        // Facing away (or seen edge-on) exactly if the determinant is not negative.
+        // A triangle faces away (or is edge-on) exactly if the determinant is not negative.
         if det >= 0.0 || v.iter().all(|p| p.z < NEAR_M) {
             continue;
         }
@@ -48,8 +47,7 @@ pub fn project(mesh: &Mesh, mesh_index: u8, t_cam_world: &Isometry3<f64>, view: 
             continue;
         }
         let normal = (v[1] - v[0]).cross(&(v[2] - v[0]));
-        // Edges stay unscaled: two triangles that share an edge then see exactly opposite values, and no ray slips
-        // through between them.
+        // Edges stay unscaled: two triangles that share an edge have exactly opposite values, and no ray passes between them.
         out.push(Projected {
             edges: crosses.map(|c| [-c.x as f32, -c.y as f32, -c.z as f32]),
             edge_scale: (-1.0 / det) as f32,

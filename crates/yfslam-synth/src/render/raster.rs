@@ -1,4 +1,4 @@
-//! Visibility: which triangle each pixel sees, and at what depth.
+//! Visibility: the visible triangle of each pixel and its depth.
 //!
 //! In: projected triangles and rays. Out: per pixel the inverse depth and the index of the nearest triangle. The image is
 //! cut into tiles; a tile keeps only triangles that can touch it, nearest first, and stops when it is covered. Bands of
@@ -9,25 +9,25 @@ use rayon::prelude::*;
 use super::project::Projected;
 use super::rays::{RayTable, Rect, TILE};
 
-/// Triangle index of a pixel that sees nothing.
+/// Triangle index of a pixel without a visible triangle.
 pub const NOTHING: u32 = u32::MAX;
 
 /// Per-pixel visibility in rows of [`RayTable::stride`].
 #[derive(Clone, Debug, Default)]
 pub struct Visibility {
-    /// 1/z, 1/m; 0 where nothing is seen.
+    /// 1/z, 1/m; 0 where nothing is visible.
     pub inverse_depth: Vec<f32>,
     /// Index into the projected triangles, or [`NOTHING`].
     pub triangle: Vec<u32>,
 }
 
 impl Visibility {
-    /// Nothing seen yet.
+    /// Creates an empty visibility.
     pub fn empty(rays: &RayTable) -> Self {
         Self { inverse_depth: vec![0.0; rays.x.len()], triangle: vec![NOTHING; rays.x.len()] }
     }
 
-    /// Puts `triangles` before or behind what is seen already, pixel by pixel.
+    /// Adds `triangles`; the nearest one wins in each pixel.
     pub fn add(&mut self, rays: &RayTable, triangles: &[Projected]) {
         let band = TILE * rays.stride;
         let bands = self.inverse_depth.par_chunks_mut(band).zip(self.triangle.par_chunks_mut(band));
@@ -50,12 +50,12 @@ impl Visibility {
 /// A triangle that may touch the tile, and the greatest inverse depth it can have there.
 type Candidate = (f32, u32);
 
-/// A tile at work.
+/// A tile that is being drawn.
 struct Tile<'a> {
     rays: &'a RayTable,
     band: usize,
     column: usize,
-    /// What may be seen, nearest first.
+    /// Triangles that may be visible, nearest first.
     list: Vec<Candidate>,
 }
 
@@ -82,7 +82,7 @@ impl Tile<'_> {
         let (xs, ys) = (self.rays.x.as_chunks::<TILE>().0, self.rays.y.as_chunks::<TILE>().0);
         let (depths, ids) = (depths.as_chunks_mut::<TILE>().0, ids.as_chunks_mut::<TILE>().0);
         let pitch = self.rays.pitch[1];
-        // Everything in the tile is at least this near once some triangle covers the whole tile.
+        // All visible surfaces of the tile are at least this near once a triangle covers the whole tile.
         let mut covered_from = 0.0;
         for &(nearest, id) in &self.list {
             if nearest < covered_from {
@@ -96,7 +96,7 @@ impl Tile<'_> {
                 let local = row * across + self.column;
                 let global = self.band * TILE * across + local;
                 let ends = [ys[global][0], ys[global][TILE - 1]];
-                // A pixel of slack, as rows bend under distortion.
+                // A margin of one pixel, as rows bend under distortion.
                 if ends[0].min(ends[1]) - pitch <= t.bounds.y[1] && ends[0].max(ends[1]) + pitch >= t.bounds.y[0] {
                     draw_row(t, id, &xs[global], &ys[global], &mut depths[local], &mut ids[local]);
                 }
@@ -105,7 +105,7 @@ impl Tile<'_> {
     }
 }
 
-/// One row of a tile; written without branches so that the compiler vectorises it.
+/// Draws one row of a tile, without branches so that the compiler vectorises it.
 #[inline]
 fn draw_row(
     t: &Projected,

@@ -1,7 +1,7 @@
-//! The viewing ray of every pixel, lens distortion included, cut into tiles.
+//! The viewing rays of all pixels, lens distortion included, in tiles.
 //!
-//! In: a [`Camera`]. Out: normalised image coordinates (x = X/Z, y = Y/Z) per pixel, and their range per tile. Rays of
-//! the columns and rows that pad the image to whole tiles are extrapolated; their pixels are rendered and thrown away.
+//! In: a [`Camera`]. Out: normalised image coordinates (x = X/Z, y = Y/Z) per pixel, and their range per tile. Rays of the columns
+//! and rows that pad the image to whole tiles are extrapolated; their pixels are rendered and dropped.
 
 use rayon::prelude::*;
 use yfslam::Camera;
@@ -9,7 +9,7 @@ use yfslam::Camera;
 /// Side of a tile, px.
 pub const TILE: usize = 16;
 
-/// Range of normalised coordinates that a tile looks at.
+/// Range of normalised coordinates of a tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rect {
     /// Least and greatest x.
@@ -28,7 +28,7 @@ impl Rect {
         self.y = [self.y[0].min(y), self.y[1].max(y)];
     }
 
-    /// The smallest rectangle around both.
+    /// Returns the smallest rectangle around both.
     pub fn union(self, other: Self) -> Self {
         Self {
             x: [self.x[0].min(other.x[0]), self.x[1].max(other.x[1])],
@@ -36,18 +36,18 @@ impl Rect {
         }
     }
 
-    /// Whether the rectangles share a point.
+    /// Returns whether the rectangles share a point.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.x[0] <= other.x[1] && other.x[0] <= self.x[1] && self.y[0] <= other.y[1] && other.y[0] <= self.y[1]
     }
 
-    /// Greatest value of `a x + b y + c` over the rectangle.
+    /// Returns the greatest value of `a x + b y + c` over the rectangle.
     pub fn max_of(&self, plane: &[f32; 3]) -> f32 {
         let [a, b, c] = *plane;
         (a * self.x[0]).max(a * self.x[1]) + (b * self.y[0]).max(b * self.y[1]) + c
     }
 
-    /// Least value of `a x + b y + c` over the rectangle.
+    /// Returns the least value of `a x + b y + c` over the rectangle.
     pub fn min_of(&self, plane: &[f32; 3]) -> f32 {
         let [a, b, c] = *plane;
         (a * self.x[0]).min(a * self.x[1]) + (b * self.y[0]).min(b * self.y[1]) + c
@@ -97,7 +97,7 @@ impl RayTable {
         }
         let pitch = [1.0 / camera.fx as f32, 1.0 / camera.fy as f32];
         for tile in &mut tiles {
-            // Anti-aliasing looks up to half a pixel beyond the pixel centres.
+            // Anti-aliasing samples up to half a pixel beyond the pixel centres.
             tile.x = [tile.x[0] - pitch[0], tile.x[1] + pitch[0]];
             tile.y = [tile.y[0] - pitch[1], tile.y[1] + pitch[1]];
         }
@@ -105,7 +105,7 @@ impl RayTable {
         Self { width, height, stride, x, y, tiles, bands, pitch }
     }
 
-    /// Range of the whole image.
+    /// Returns the range of the whole image.
     pub fn view(&self) -> Rect {
         self.bands.iter().copied().fold(Rect::empty(), Rect::union)
     }

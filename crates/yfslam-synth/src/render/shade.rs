@@ -1,8 +1,8 @@
-//! Colour of a surface where a ray meets it: filtered texture times light.
+//! Computes the colour of a surface where a ray meets it: filtered texture times light.
 //!
-//! In: a projected triangle and a ray. Out: linear RGB. Attributes are interpolated with perspective: attribute/z is
-//! linear over the image (Olano and Greer 1997, section 3.2), and so the size of a pixel on the texture, which chooses
-//! the mip level (Williams, "Pyramidal parametrics", SIGGRAPH 1983), follows in closed form.
+//! In: a projected triangle and a ray. Out: linear RGB. Attributes are interpolated with perspective: attribute/z is linear over
+//! the image (Olano and Greer 1997, section 3.2), and so the size of a pixel on the texture, which selects the mip level (Williams,
+//! "Pyramidal parametrics", SIGGRAPH 1983), follows in closed form.
 
 use super::project::Projected;
 use crate::bake::LightMap;
@@ -11,7 +11,7 @@ use crate::mesh::{Lighting, Mesh, Vec3};
 use crate::surfaces::Surfaces;
 use crate::texture::Texture;
 
-/// All that shading reads.
+/// The input of shading.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
     /// Meshes by [`Projected::mesh`].
@@ -20,7 +20,7 @@ pub struct View<'a> {
     pub surfaces: &'a Surfaces,
     /// Brightness of flickering lamps.
     pub brightness: f32,
-    /// Bodies that darken what is near them; positions in camera coordinates.
+    /// Bodies that darken their surroundings; positions in camera coordinates.
     pub occluders: &'a [Occluder],
     /// Rotation from world to camera.
     pub r_cam_world: nalgebra::UnitQuaternion<f32>,
@@ -30,16 +30,16 @@ pub struct View<'a> {
 
 type Plane = [f32; 3];
 
-/// Reflectance of a screen's glass, whatever it shows.
+/// Reflectance of the glass of a screen, whatever it displays.
 const GLASS: f32 = 0.04;
 
-/// What a ray meets.
+/// The surface that a ray meets.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shaded {
     /// Linear RGB.
     pub color: [f32; 3],
-    /// Share of the projector's infrared light that the surface reflects: that of its material as a whole, since most inks and dyes let
-    /// infrared pass.
+    /// Share of the infrared light of the projector that the surface reflects: that of its material as a whole, since most inks and
+    /// dyes transmit infrared light.
     pub reflectance: f32,
 }
 
@@ -61,13 +61,13 @@ fn at(plane: &Plane, x: f32, y: f32) -> f32 {
 }
 
 impl<'a> View<'a> {
-    /// Instance (0 static, k actor) of a projected triangle.
+    /// Returns the instance (0 static, k actor) of a projected triangle.
     pub fn instance(&self, t: &Projected) -> u8 {
         let mesh = self.meshes[usize::from(t.mesh)];
         mesh.patches[mesh.triangles[t.triangle as usize].patch as usize].instance
     }
 
-    /// Makes the textures and light maps of everything that is seen.
+    /// Computes the textures and light maps of all visible surfaces.
     pub fn prepare(&self, triangles: &[Projected], seen: &[u32]) {
         let mut visible = vec![false; triangles.len()];
         for &id in seen {
@@ -82,12 +82,12 @@ impl<'a> View<'a> {
         self.surfaces.prepare(self.meshes[0], patches);
     }
 
-    /// Number that tells patches of all meshes apart.
+    /// Returns a number that distinguishes the patches of all meshes.
     pub fn patch(&self, t: &Projected) -> u32 {
         (self.meshes[usize::from(t.mesh)].triangles[t.triangle as usize].patch << 1) | u32::from(t.mesh)
     }
 
-    /// Gathers what the triangle's pixels share.
+    /// Collects the values that the pixels of the triangle share.
     pub fn surface(&self, t: &Projected) -> Surface<'a> {
         let mesh = self.meshes[usize::from(t.mesh)];
         let triangle = mesh.triangles[t.triangle as usize];
@@ -119,7 +119,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// What is seen where the ray (x, y, 1) meets the surface, shaded by those of the occluders that are `near`.
+    /// Shades the surface where the ray (x, y, 1) meets it; the occluders `near` darken it.
     pub fn shade(&self, surface: &Surface, near: &[Occluder], x: f32, y: f32) -> Shaded {
         let z = 1.0 / at(&surface.inverse_depth, x, y);
         let (u, v) = (at(&surface.u, x, y) * z, at(&surface.v, x, y) * z);
@@ -134,7 +134,7 @@ impl<'a> View<'a> {
         let squared = |d: [f32; 2]| d[0] * d[0] + d[1] * d[1];
         let (sx, sy) = (squared(along_x), squared(along_y));
         let (major, long, short) = if sx > sy { (along_x, sx, sy) } else { (along_y, sy, sx) };
-        // Surfaces seen at a grazing angle get two taps along the longer axis, each at half its length.
+        // Surfaces at a grazing angle get two samples along the longer axis, each with half its length.
         let color = if long > 2.0 * short && long > 2.0 {
             let lod = 0.5 * log2(long) - 1.0;
             let (ou, ov) = (0.25 * major[0] / w, 0.25 * major[1] / h);
@@ -166,7 +166,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// Base-two logarithm, within 0.01 of the truth, from the bits of the float.
+/// Returns the base-two logarithm, with an error of at most 0.01, from the bits of the float.
 fn log2(x: f32) -> f32 {
     let bits = x.max(1e-12).to_bits();
     let exponent = (bits >> 23) as f32 - 127.0;

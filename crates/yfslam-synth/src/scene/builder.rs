@@ -32,7 +32,7 @@ impl Palette {
         (self.orders.len() - 1) as u32
     }
 
-    /// Number of textures that were ordered.
+    /// Returns the number of ordered textures.
     pub fn len(&self) -> usize {
         self.orders.len()
     }
@@ -47,7 +47,7 @@ impl Palette {
 /// The six sides of a box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Towards −y, where the camera stands.
+    /// Towards −y, where the camera is.
     Front,
     /// Towards +y.
     Back,
@@ -64,42 +64,42 @@ pub enum Side {
 /// Builds the static mesh of a scene.
 #[derive(Debug)]
 pub struct Builder {
-    /// What has been built.
+    /// The mesh built so far.
     pub mesh: Mesh,
-    /// The textures it needs.
+    /// The textures of the mesh.
     pub palette: Palette,
     /// Draws for variety.
     pub rng: Rng,
-    /// Texels per metre of what is built next.
+    /// Texels per metre of the next shapes.
     pub density: f32,
 }
 
 impl Builder {
-    /// An empty scene.
+    /// Creates an empty scene.
     pub fn new(seed: u64) -> Self {
         Self { mesh: Mesh::default(), palette: Palette::default(), rng: Rng::new(seed, 0x5ce), density: 500.0 }
     }
 
-    /// A patch of the material for a surface of the given size.
+    /// Creates a patch of the material for a surface of the given size.
     pub fn patch(&mut self, material: Material, size_m: [f32; 2]) -> Patch {
         let seed = self.rng.bits();
         let texture = self.palette.order(material, size_m, self.density * material.detail(), seed);
         Patch { texture, lighting: Lighting::Baked, instance: 0 }
     }
 
-    /// A flat rectangle; `right` and `down` are its edges as seen from outside.
+    /// Adds a flat rectangle; `right` and `down` are its edges as seen from outside.
     pub fn rectangle(&mut self, top_left: Vec3, right: Vec3, down: Vec3, material: Material) {
         let patch = self.patch(material, [right.norm(), down.norm()]);
         self.mesh.rectangle(top_left, right, down, patch);
     }
 
-    /// A rectangle that shines by itself.
+    /// Adds a rectangle that emits light.
     pub fn glowing(&mut self, top_left: Vec3, right: Vec3, down: Vec3, material: Material, factor: f32) {
         let patch = self.patch(material, [right.norm(), down.norm()]);
         self.mesh.rectangle(top_left, right, down, Patch { lighting: Lighting::Emissive(factor), ..patch });
     }
 
-    /// A lamp under the ceiling whose panel glows with `factor`, with half edges along x and y.
+    /// Adds a lamp under the ceiling whose panel glows with `factor`, with half edges along x and y.
     pub fn lamp(&mut self, center: Vec3, half: [Vec3; 2], factor: f32, radiance: [f32; 3], steady: bool) -> Lamp {
         let strongest = radiance.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         let [right, down] = half.map(|edge| edge * 2.0);
@@ -109,12 +109,12 @@ impl Builder {
         Lamp { center, half, normal: -Vec3::z(), radiance, steady }
     }
 
-    /// A box that stands on `base` (the middle of its bottom), turned by `yaw` about the vertical.
+    /// Adds a box on `base` (the middle of its bottom), turned by `yaw` about the vertical.
     pub fn cuboid(&mut self, base: Vec3, size: Vec3, yaw: f32, material: impl Fn(Side) -> Material) {
         self.tilted(upright(base, yaw), size, material);
     }
 
-    /// A box with the middle of its bottom at the origin of `pose`.
+    /// Adds a box with the middle of its bottom at the origin of `pose`.
     pub fn tilted(&mut self, pose: Isometry3<f32>, size: Vec3, material: impl Fn(Side) -> Material) {
         let first = self.mesh.vertices.len();
         let h = Vec3::new(size.x / 2.0, size.y / 2.0, size.z);
@@ -127,7 +127,7 @@ impl Builder {
             (Side::Top, Vec3::new(-h.x, h.y, h.z), dx, -dy),
             (Side::Bottom, Vec3::new(-h.x, -h.y, 0.0), dx, dy),
         ] {
-            // The underside of what lies on the floor is never seen, and the camera hardly gets behind things.
+            // The underside of objects on the floor is never visible, and the back hardly ever.
             let density = self.density;
             self.density = if matches!(side, Side::Back | Side::Bottom) { 0.4 * density } else { density };
             if side != Side::Bottom || pose.translation.z > 0.01 {
@@ -138,7 +138,7 @@ impl Builder {
         self.mesh.transform_from(first, &pose);
     }
 
-    /// A broken piece: a box around the origin of `pose` whose corners are knocked inwards, each by its own draw.
+    /// Adds a fragment: a box around the origin of `pose` whose corners are moved inward, each by its own draw.
     pub fn chunk(&mut self, pose: Isometry3<f32>, size: Vec3, material: Material) {
         let first = self.mesh.vertices.len();
         let corners: [Vec3; 8] = std::array::from_fn(|k| {
@@ -159,7 +159,7 @@ impl Builder {
         self.mesh.transform_from(first, &pose);
     }
 
-    /// A body of revolution that stands on `base`; rings are (height, radius), top first.
+    /// Adds a body of revolution on `base`; rings are (height, radius), top first.
     pub fn turned(&mut self, base: Vec3, rings: &[[f32; 2]], segments: u32, material: Material) {
         let first = self.mesh.vertices.len();
         let radius = rings.iter().map(|r| r[1]).fold(0.0, f32::max);

@@ -1,5 +1,5 @@
-//! Four corridors around a block, as in an institute: alike at first sight (doors, lamps, radiators at the same pitch),
-//! each place different in its plates, papers, colours and what stands about.
+//! Four corridors around a block, as in an institute: similar everywhere (doors, lamps, radiators at the same pitch), but each
+//! place differs in its plates, papers, colours and objects.
 
 use nalgebra::Point3;
 
@@ -18,9 +18,9 @@ const MIDDLE: [f32; 2] = [6.4, 5.0];
 /// Half the width of a corridor.
 const HALF: f32 = 1.2;
 const HEIGHT: f32 = 2.7;
-/// Height up to which the walls are painted in the corridor's colour.
+/// Height up to which the walls are painted in the colour of the corridor.
 const DADO: f32 = 1.05;
-/// Every corridor has its colour.
+/// Colours of the corridors.
 const COLORS: [[f32; 3]; 4] = [[0.60, 0.66, 0.58], [0.56, 0.63, 0.72], [0.74, 0.66, 0.52], [0.68, 0.60, 0.60]];
 const WHITE: [f32; 3] = [0.86, 0.86, 0.83];
 const STEEL: [f32; 3] = [0.60, 0.61, 0.63];
@@ -31,7 +31,7 @@ pub fn build(seed: u64) -> Scene {
     let span = |m: f32| [-m, m];
     let outer = Wall::room(span(mx + HALF), span(my + HALF));
     let inner = Wall::block(span(mx - HALF), span(my - HALF));
-    // The block's south side faces the south corridor and so on: bring both into the order north, east, south, west.
+    // The south side of the block faces the south corridor and so on: both are brought into the order north, east, south, west.
     let inner = [inner[2], inner[1], inner[0], inner[3]];
     let lamps = floor_and_ceiling(&mut b);
     for (k, color) in COLORS.into_iter().enumerate() {
@@ -63,7 +63,7 @@ pub fn build(seed: u64) -> Scene {
         walk_half_width: 0.65,
         walk_far_y: 2.2,
         walk_near_y: [-2.65, -2.3],
-        round: vec![
+        circuit: vec![
             [west, -2.0],
             [west, my.into()],
             [mx.into(), my.into()],
@@ -76,11 +76,11 @@ pub fn build(seed: u64) -> Scene {
     }
 }
 
-/// Floor sheets, ceiling tiles and a lamp in the middle of every second piece; the corners belong to north and south.
+/// Adds floor sheets, ceiling tiles and a lamp in the middle of every second section; the corners belong to north and south.
 fn floor_and_ceiling(b: &mut Builder) -> Vec<Lamp> {
     let [mx, my] = MIDDLE;
     let mut lamps = Vec::new();
-    let mut piece = |b: &mut Builder, x: [f32; 2], y: [f32; 2], along_x: bool| {
+    let mut section = |b: &mut Builder, x: [f32; 2], y: [f32; 2], along_x: bool| {
         let (dx, dy) = (Vec3::x() * (x[1] - x[0]), Vec3::y() * (y[1] - y[0]));
         b.density = 200.0;
         b.rectangle(Vec3::new(x[0], y[1], 0.0), dx, -dy, Material::Vinyl([0.52, 0.55, 0.54]));
@@ -95,19 +95,19 @@ fn floor_and_ceiling(b: &mut Builder) -> Vec<Lamp> {
     for middle in [my, -my] {
         for k in 0..6 {
             let x = -(mx + HALF) + k as f32 * long;
-            piece(b, [x, x + long], [middle - HALF, middle + HALF], true);
+            section(b, [x, x + long], [middle - HALF, middle + HALF], true);
         }
     }
     for middle in [mx, -mx] {
         for k in 0..3 {
             let y = -(my - HALF) + k as f32 * short;
-            piece(b, [middle - HALF, middle + HALF], [y, y + short], false);
+            section(b, [middle - HALF, middle + HALF], [y, y + short], false);
         }
     }
     lamps
 }
 
-/// Offices: a door every 2.6 m, papers beside some.
+/// Adds offices: a door every 2.6 m, papers beside some.
 fn inner_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
     let pitch = 2.6;
     let count = (wall.length / pitch) as usize;
@@ -120,36 +120,36 @@ fn inner_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
         match (bay + corridor) % 4 {
             0 => {
                 b.density = 450.0;
-                wall.hang(b, [paper, 2.05], [0.6, 0.84], Material::Poster);
+                wall.attach(b, [paper, 2.05], [0.6, 0.84], Material::Poster);
             }
             1 => {
                 b.density = 420.0;
-                wall.hang(b, [paper - 0.05, 2.0], [0.95, 0.7], Material::NoticeBoard);
+                wall.attach(b, [paper - 0.05, 2.0], [0.95, 0.7], Material::NoticeBoard);
             }
             2 => {
                 b.density = 700.0;
-                wall.hang(b, [paper, 1.75], [0.21, 0.297], Material::Paper);
-                wall.hang(b, [paper + 0.35, 1.80], [0.297, 0.42], Material::Poster);
+                wall.attach(b, [paper, 1.75], [0.21, 0.297], Material::Paper);
+                wall.attach(b, [paper + 0.35, 1.80], [0.297, 0.42], Material::Poster);
                 extinguisher(b, wall, paper + 0.75);
             }
             _ => {
                 b.density = 450.0;
-                wall.hang(b, [paper, 1.95], [0.84, 0.6], Material::Poster);
+                wall.attach(b, [paper, 1.95], [0.84, 0.6], Material::Poster);
             }
         }
         if bay % 2 == corridor % 2 {
             b.density = 600.0;
             let color = b.rng.pick([[0.10, 0.46, 0.28], [0.16, 0.36, 0.62], [0.62, 0.14, 0.13]]);
-            wall.hang(b, [s + 0.55, 2.42], [0.40, 0.20], Material::Sign(color));
+            wall.attach(b, [s + 0.55, 2.42], [0.40, 0.20], Material::Sign(color));
         }
     }
 }
 
-/// The outside: windows above radiators in the north and east, boards and lockers in the south and west.
+/// Adds the outside: windows above radiators in the north and east, boards and lockers in the south and west.
 fn outer_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
     let pitch = 2.5;
     corner_prints(b, wall, corridor);
-    // The corners hold landmarks.
+    // The corners have landmarks.
     let count = ((wall.length - 3.2) / pitch) as usize;
     let start = (wall.length - count as f32 * pitch) / 2.0;
     for bay in 0..count {
@@ -174,26 +174,26 @@ fn outer_bays(b: &mut Builder, wall: &Wall, corridor: usize) {
             }
             1 => {
                 b.density = 420.0;
-                wall.hang(b, [s + 0.4, 2.15], [1.5, 0.85], Material::NoticeBoard);
+                wall.attach(b, [s + 0.4, 2.15], [1.5, 0.85], Material::NoticeBoard);
             }
             2 => {
                 b.density = 420.0;
                 for (left, top, w, h) in [(0.3, 2.2, 0.6, 0.84), (1.1, 2.1, 0.9, 0.65)] {
                     let jitter = b.rng.range(-0.08, 0.08);
-                    wall.hang(b, [s + left + jitter, top + jitter], [w, h], Material::Poster);
+                    wall.attach(b, [s + left + jitter, top + jitter], [w, h], Material::Poster);
                 }
             }
             _ => {
                 b.density = 350.0;
                 wall.door(b, s + 0.7, [0.98, 2.06], [0.42, 0.48, 0.55]);
                 b.density = 600.0;
-                wall.hang(b, [s + 1.9, 1.9], [0.42, 0.6], Material::Poster);
+                wall.attach(b, [s + 1.9, 1.9], [0.42, 0.6], Material::Poster);
             }
         }
     }
 }
 
-/// Plans, boards and signs on the pieces of wall at both ends: who comes around a corner sees little else.
+/// Adds plans, boards and signs to the sections of wall at both ends, which fill the view of a camera that comes around a corner.
 fn corner_prints(b: &mut Builder, wall: &Wall, corridor: usize) {
     let end = wall.length;
     b.density = 420.0;
@@ -213,22 +213,22 @@ fn corner_prints(b: &mut Builder, wall: &Wall, corridor: usize) {
     ];
     for (s, z, w, h, material) in prints {
         let jitter = b.rng.range(-0.06, 0.06);
-        wall.hang(b, [s + jitter, z + jitter], [w, h], material);
+        wall.attach(b, [s + jitter, z + jitter], [w, h], material);
     }
     b.density = 600.0;
-    wall.hang(b, [end - 1.45, 2.45], [0.50, 0.22], Material::Sign([0.10, 0.46, 0.28]));
-    wall.hang(b, [1.25, 0.35], [0.16, 0.08], Material::Socket);
-    wall.hang(b, [end - 1.3, 0.35], [0.16, 0.08], Material::Socket);
+    wall.attach(b, [end - 1.45, 2.45], [0.50, 0.22], Material::Sign([0.10, 0.46, 0.28]));
+    wall.attach(b, [1.25, 0.35], [0.16, 0.08], Material::Socket);
+    wall.attach(b, [end - 1.3, 0.35], [0.16, 0.08], Material::Socket);
 }
 
 fn extinguisher(b: &mut Builder, wall: &Wall, s: f32) {
     b.density = 500.0;
     let rings = [[0.52, 0.0], [0.52, 0.03], [0.44, 0.035], [0.40, 0.08], [0.0, 0.08]];
     b.turned(wall.at(s, 0.25, 0.10), &rings, 14, Material::Rusty([0.72, 0.12, 0.10]));
-    wall.hang(b, [s - 0.1, 1.45], [0.2, 0.2], Material::Sign([0.70, 0.13, 0.11]));
+    wall.attach(b, [s - 0.1, 1.45], [0.2, 0.2], Material::Sign([0.70, 0.13, 0.11]));
 }
 
-/// What stands in the outer corners: something different in each.
+/// Adds a different object to each outer corner.
 fn landmarks(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     plant(b, north.at(0.42, 0.0, 0.42));
     plant(b, south.at(0.45, 0.0, 0.42));
@@ -254,7 +254,7 @@ fn landmarks(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     bin(b, west.at(8.4, 0.0, 0.18));
 }
 
-/// A bench in the corridor where the camera starts; returns its seats.
+/// Adds a bench in the corridor where the camera starts; returns its seats.
 fn bench(b: &mut Builder, west: &Wall) -> Vec<Seat> {
     const SEAT_Z: f32 = 0.46;
     // From y = −1.2 to y = 0.2.

@@ -10,7 +10,7 @@ use crate::texture::print::ink;
 const STEEL: [f32; 3] = [0.52, 0.54, 0.57];
 const DARK: [f32; 3] = [0.20, 0.20, 0.22];
 
-/// A desk; `base` is the middle of its footprint on the floor.
+/// Adds a desk; `base` is the middle of its footprint on the floor.
 pub fn desk(b: &mut Builder, base: Vec3, width: f32, depth: f32, height: f32) {
     let top = base + Vec3::z() * (height - 0.03);
     b.density = 600.0;
@@ -24,7 +24,7 @@ pub fn desk(b: &mut Builder, base: Vec3, width: f32, depth: f32, height: f32) {
     b.cuboid(panel, Vec3::new(width - 0.12, 0.02, height - 0.10), 0.0, |_| Material::Plain([0.62, 0.64, 0.66]));
 }
 
-/// A monitor that faces −y before it is turned by `yaw`; `base` is where its foot stands.
+/// Adds a monitor that faces −y before it is turned by `yaw`; `base` is the place of its foot.
 pub fn monitor(b: &mut Builder, base: Vec3, yaw: f32) {
     let (sin, cos) = yaw.sin_cos();
     let turned = |x: f32, y: f32, z: f32| base + Vec3::new(cos * x - sin * y, sin * x + cos * y, z);
@@ -37,7 +37,7 @@ pub fn monitor(b: &mut Builder, base: Vec3, yaw: f32) {
     b.glowing(top_left, right * 0.53, -Vec3::z() * 0.315, Material::Screen, 0.85);
 }
 
-/// A book lying flat; returns the height of its top above `base`.
+/// Adds a book lying flat; returns the height of its top above `base`.
 pub fn lying_book(b: &mut Builder, base: Vec3, yaw: f32) -> f32 {
     let size = Vec3::new(b.rng.range(0.15, 0.20), b.rng.range(0.22, 0.27), b.rng.range(0.02, 0.05));
     let color = ink(&mut b.rng);
@@ -50,7 +50,7 @@ pub fn lying_book(b: &mut Builder, base: Vec3, yaw: f32) -> f32 {
     size.z
 }
 
-/// A row of standing books from `start` along +x over `length`, fronts towards −y.
+/// Adds a row of standing books from `start` along +x over `length`, with the fronts towards −y.
 pub fn book_row(b: &mut Builder, start: Vec3, length: f32) {
     b.density = 700.0;
     let mut x = 0.0;
@@ -74,7 +74,7 @@ pub fn book_row(b: &mut Builder, start: Vec3, length: f32) {
     }
 }
 
-/// An open shelf full of books, open towards −y; `base` is the middle of its footprint.
+/// Adds an open shelf full of books, open towards −y; `base` is the middle of its footprint.
 pub fn bookshelf(b: &mut Builder, base: Vec3, width: f32, height: f32, boards: usize) {
     let (depth, thick) = (0.30, 0.025);
     let wood = Material::Wood([0.62, 0.48, 0.33]);
@@ -96,7 +96,7 @@ pub fn bookshelf(b: &mut Builder, base: Vec3, width: f32, height: f32, boards: u
     }
 }
 
-/// An office chair whose sitter faces `yaw` (0 is +y); returns the middle of the seat's top.
+/// Adds an office chair whose sitter faces `yaw` (0 is +y); returns the middle of the top of the seat.
 pub fn chair(b: &mut Builder, base: Vec3, yaw: f32, color: [f32; 3]) -> Vec3 {
     let (sin, cos) = yaw.sin_cos();
     let turned = |x: f32, y: f32, z: f32| base + Vec3::new(cos * x - sin * y, sin * x + cos * y, z);
@@ -116,7 +116,7 @@ pub fn chair(b: &mut Builder, base: Vec3, yaw: f32, color: [f32; 3]) -> Vec3 {
     turned(0.0, 0.0, seat_z)
 }
 
-/// A mug.
+/// Adds a mug.
 pub fn mug(b: &mut Builder, base: Vec3) {
     let color = ink(&mut b.rng);
     b.density = 900.0;
@@ -124,7 +124,7 @@ pub fn mug(b: &mut Builder, base: Vec3) {
     b.turned(base, &rings, 18, Material::Shirt(color, [0.92, 0.92, 0.90], Pattern::Stripes));
 }
 
-/// A potted plant: long leaves that rise from the pot and bend outwards.
+/// Adds a potted plant: long leaves that rise from the pot and bend outward.
 pub fn plant(b: &mut Builder, base: Vec3) {
     b.density = 400.0;
     b.turned(base, &[[0.34, 0.0], [0.34, 0.15], [0.36, 0.18], [0.0, 0.13]], 20, Material::Plain([0.66, 0.36, 0.24]));
@@ -139,7 +139,7 @@ pub fn plant(b: &mut Builder, base: Vec3) {
         let first = b.mesh.vertices.len();
         let patch = b.patch(Material::Leaves, [0.2, length]);
         b.mesh.loft(8, &rings, patch);
-        // The blade's thin side looks outwards and up.
+        // The thin side of the blade points outward and up.
         let turn = UnitQuaternion::from_axis_angle(&Vec3::z_axis(), azimuth)
             * UnitQuaternion::from_axis_angle(&Vec3::y_axis(), 0.4 + tilt);
         b.mesh.transform_from(first, &Isometry3::from_parts((base + stem).into(), turn));
@@ -147,7 +147,7 @@ pub fn plant(b: &mut Builder, base: Vec3) {
     }
 }
 
-/// A waste-paper bin.
+/// Adds a waste-paper bin.
 pub fn bin(b: &mut Builder, base: Vec3) {
     b.density = 500.0;
     b.turned(base, &[[0.30, 0.0], [0.31, 0.13], [0.33, 0.15], [0.0, 0.11]], 18, Material::Plain(DARK));

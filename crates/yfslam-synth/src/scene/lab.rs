@@ -1,5 +1,5 @@
-//! An empty laboratory: white walls with hardly any texture. What there is to see are edges: skirting, cable duct,
-//! sockets, lamps, floor seams, a whiteboard, two doors, a bench along the wall.
+//! An empty laboratory: white walls with hardly any texture. Only edges are visible: skirting, cable duct, sockets, lamps, floor
+//! seams, a whiteboard, two doors, a bench along the wall.
 
 use nalgebra::Point3;
 
@@ -35,14 +35,14 @@ pub fn build(seed: u64) -> Scene {
         walk_half_width: 2.2,
         walk_far_y: 2.0,
         walk_near_y: [-0.65, -0.30],
-        round: vec![[0.0, -1.3], [-1.6, -1.2], [-1.6, 1.5], [1.6, 1.5], [1.6, -1.2]],
+        circuit: vec![[0.0, -1.3], [-1.6, -1.2], [-1.6, 1.5], [1.6, 1.5], [1.6, -1.2]],
         company: Company::Apart,
         seats,
         stands: vec![stand(-1.7, 1.2, -2.4), stand(1.8, 1.1, 2.4), stand(-0.4, 2.0, 3.0), stand(0.6, 1.9, -2.8)],
     }
 }
 
-/// Floor, ceiling, walls, lamps.
+/// Adds floor, ceiling, walls, lamps.
 fn shell(b: &mut Builder, walls: &[Wall; 4]) -> Vec<Lamp> {
     b.density = 260.0;
     // Sheets of floor, 1.5 m × 1.8 m.
@@ -65,22 +65,22 @@ fn shell(b: &mut Builder, walls: &[Wall; 4]) -> Vec<Lamp> {
     places.map(|(x, y, steady)| b.lamp(Vec3::new(x, y, HEIGHT - 0.03), half, 1.3, [2.6, 2.6, 2.55], steady)).to_vec()
 }
 
-/// The little that hangs and stands along the walls.
+/// Adds the few objects on and along the walls.
 fn fixtures(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     b.density = 400.0;
-    // Left edges of the doors, which the duct spares.
+    // Left edges of the doors, which interrupt the duct.
     let doors = [None, None, Some(1.2), Some(3.0)];
     for (wall, door) in [north, east, south, west].into_iter().zip(doors) {
         let blocked = |from: f32, to: f32| door.is_some_and(|left| to > left && from < left + DOOR[0]);
         // The cable duct at bench height with a lid joint every metre, and sockets on it.
         let joints = (wall.length - 0.2).floor() as usize;
-        let piece = (wall.length - 0.1) / joints as f32;
+        let section = (wall.length - 0.1) / joints as f32;
         for k in 0..joints {
-            let s = 0.05 + (k as f32 + 0.5) * piece;
-            if blocked(s - 0.5 * piece, s + 0.5 * piece) {
+            let s = 0.05 + (k as f32 + 0.5) * section;
+            if blocked(s - 0.5 * section, s + 0.5 * section) {
                 continue;
             }
-            wall.mount(b, [s, 1.02], Vec3::new(piece - 0.006, 0.05, 0.13), |_| Material::Plain([0.80, 0.81, 0.82]));
+            wall.mount(b, [s, 1.02], Vec3::new(section - 0.006, 0.05, 0.13), |_| Material::Plain([0.80, 0.81, 0.82]));
         }
         for s in
             [0.7, 1.1, 2.4, 3.9, 4.3, 5.1].into_iter().filter(|&s| s + 0.2 < wall.length && !blocked(s - 0.5, s + 0.6))
@@ -91,16 +91,16 @@ fn fixtures(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
         }
     }
     b.density = 500.0;
-    north.hang(b, [0.9, 2.05], [1.5, 0.95], Material::Whiteboard);
+    north.attach(b, [0.9, 2.05], [1.5, 0.95], Material::Whiteboard);
     north.mount(b, [1.65, 1.09], Vec3::new(1.4, 0.06, 0.02), |_| Material::Plain(STEEL));
-    north.hang(b, [5.0, 2.35], [0.34, 0.17], Material::Sign([0.10, 0.48, 0.30]));
+    north.attach(b, [5.0, 2.35], [0.34, 0.17], Material::Sign([0.10, 0.48, 0.30]));
     b.density = 900.0;
-    north.hang(b, [2.6, 1.75], [0.21, 0.297], Material::Paper);
-    north.hang(b, [4.15, 1.62], [0.15, 0.15], Material::Sign([0.16, 0.36, 0.62]));
+    north.attach(b, [2.6, 1.75], [0.21, 0.297], Material::Paper);
+    north.attach(b, [4.15, 1.62], [0.15, 0.15], Material::Sign([0.16, 0.36, 0.62]));
     b.density = 350.0;
     // Ventilation grilles and a pipe under the ceiling.
-    north.hang(b, [3.1, 2.55], [0.6, 0.25], Material::Ribs([0.80; 3]));
-    west.hang(b, [3.4, 2.55], [0.6, 0.25], Material::Ribs([0.80; 3]));
+    north.attach(b, [3.1, 2.55], [0.6, 0.25], Material::Ribs([0.80; 3]));
+    west.attach(b, [3.4, 2.55], [0.6, 0.25], Material::Ribs([0.80; 3]));
     north.mount(b, [3.0, 2.62], Vec3::new(5.9, 0.08, 0.08), |_| Material::Plain([0.78, 0.79, 0.80]));
     for s in [0.9, 2.5, 4.1, 5.6] {
         north.mount(b, [s, 2.60], Vec3::new(0.04, 0.10, 0.12), |_| Material::Plain(STEEL));
@@ -109,11 +109,11 @@ fn fixtures(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     west.door(b, 3.0, DOOR, [0.66, 0.70, 0.74]);
     south.door(b, 1.2, DOOR, [0.66, 0.70, 0.74]);
     b.density = 800.0;
-    west.hang(b, [4.2, 1.30], [0.09, 0.09], Material::Socket);
-    west.hang(b, [2.6, 2.3], [0.30, 0.15], Material::Sign([0.62, 0.14, 0.13]));
-    east.hang(b, [1.6, 1.9], [0.42, 0.6], Material::Poster);
-    east.hang(b, [3.6, 1.8], [0.21, 0.297], Material::Paper);
-    south.hang(b, [3.4, 1.9], [0.6, 0.42], Material::Poster);
+    west.attach(b, [4.2, 1.30], [0.09, 0.09], Material::Socket);
+    west.attach(b, [2.6, 2.3], [0.30, 0.15], Material::Sign([0.62, 0.14, 0.13]));
+    east.attach(b, [1.6, 1.9], [0.42, 0.6], Material::Poster);
+    east.attach(b, [3.6, 1.8], [0.21, 0.297], Material::Paper);
+    south.attach(b, [3.4, 1.9], [0.6, 0.42], Material::Poster);
     bench(b, north);
     b.density = 300.0;
     east.mount(b, [4.3, 0.0], Vec3::new(0.9, 0.45, 1.9), |side| match side {
@@ -124,7 +124,7 @@ fn fixtures(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     west.mount(b, [1.7, 0.0], Vec3::new(0.42, 0.36, 0.32), |_| Material::Cardboard);
 }
 
-/// A bench along the right half of the north wall, empty but for a clamp stand and a box.
+/// Adds a bench along the right half of the north wall, empty except for a clamp stand and a box.
 fn bench(b: &mut Builder, north: &Wall) {
     b.density = 350.0;
     north.mount(b, [4.55, 0.86], Vec3::new(2.5, 0.62, 0.035), |_| Material::Plain([0.56, 0.58, 0.60]));
@@ -146,7 +146,7 @@ fn bench(b: &mut Builder, north: &Wall) {
     b.turned(on(5.2, 0.35), &[[0.17, 0.0], [0.17, 0.03], [0.11, 0.05], [0.0, 0.06]], 16, Material::Plain(STEEL));
 }
 
-/// A round stool; returns its seat.
+/// Adds a round stool; returns its seat.
 fn stool(b: &mut Builder, x: f32, y: f32, heading: f32) -> Seat {
     const SEAT_Z: f32 = 0.46;
     let base = Vec3::new(x, y, 0.0);

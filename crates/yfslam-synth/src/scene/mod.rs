@@ -1,4 +1,4 @@
-//! Places: a static mesh, its lights, where the camera stands and where people may be.
+//! Scenes: a static mesh, its lights, the start of the camera, and the places of people.
 
 pub mod builder;
 mod corridor;
@@ -15,36 +15,36 @@ use crate::light::Lights;
 use crate::mesh::{Mesh, Vec3};
 use builder::Palette;
 
-/// A place where someone can sit.
+/// A place to sit.
 #[derive(Clone, Copy, Debug)]
 pub struct Seat {
-    /// Middle of the seat's top, m.
+    /// Middle of the top of the seat, m.
     pub position: Vec3,
     /// Direction the sitter faces: angle about +z from +y, rad.
     pub heading: f32,
 }
 
-/// Where people walk while the camera goes on the round of a place.
+/// Where people walk while the camera moves along the circuit of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Company {
-    /// Around the furniture, which keeps clear of the round.
+    /// Around the furniture, away from the circuit.
     Apart,
-    /// On the round, ahead of the camera: it leaves no room to meet anyone.
+    /// On the circuit, ahead of the camera: there is no room to pass each other.
     Ahead,
-    /// On the round: some ahead of the camera, some towards it and past it, so far to the right of the round, m.
+    /// On the circuit: some ahead of the camera, some towards it and past it, at this distance to the right of the circuit, m.
     BothWays(f64),
 }
 
-/// A place.
+/// A scene.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Everything that stands still.
+    /// The static mesh.
     pub mesh: Mesh,
-    /// Its textures; people add theirs.
+    /// The textures; people add theirs.
     pub palette: Palette,
-    /// Its lights.
+    /// The lights.
     pub lights: Lights,
-    /// World from camera at the start.
+    /// Pose of the camera (world from camera) at the start.
     pub camera: Isometry3<f64>,
     /// Middle of the walk around the furniture, m.
     pub walk_center: Point3<f64>,
@@ -52,15 +52,15 @@ pub struct Scene {
     pub walk_half_width: f64,
     /// y of the far side of the walk, m.
     pub walk_far_y: f64,
-    /// Range of y for the near side of the walk: closest to the camera first, m.
+    /// Range of y for the near side of the walk, the value closest to the camera first, m.
     pub walk_near_y: [f64; 2],
-    /// Corners of a closed round on the floor along which a camera can be carried or driven, the first on a straight, m.
-    pub round: Vec<[f64; 2]>,
-    /// Where people walk while the camera is on that round.
+    /// Corners of a closed circuit on the floor along which a camera can be carried or driven, the first on a straight section, m.
+    pub circuit: Vec<[f64; 2]>,
+    /// Where people walk while the camera is on that circuit.
     pub company: Company,
-    /// Where people can sit.
+    /// Places to sit.
     pub seats: Vec<Seat>,
-    /// Where people can stand without being in the way: position on the floor and heading.
+    /// Places to stand without being in the way: position on the floor and heading.
     pub stands: Vec<Seat>,
 }
 

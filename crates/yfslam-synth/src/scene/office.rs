@@ -12,7 +12,7 @@ use crate::light::{Lamp, Lights};
 use crate::mesh::Vec3;
 use crate::texture::material::Material;
 
-/// Walls: x from −3.2 to 3.2, y from −2.8 to 3.2, height 2.7 m. The camera stands near −y and looks to +y.
+/// Walls: x from −3.2 to 3.2, y from −2.8 to 3.2, height 2.7 m. The camera is near −y and faces +y.
 const WEST: f32 = -3.2;
 const EAST: f32 = 3.2;
 const SOUTH: f32 = -2.8;
@@ -43,12 +43,12 @@ pub fn build(seed: u64) -> Scene {
         walk_near_y: [-1.1, -0.75],
         company: Company::Apart,
         seats,
-        round: vec![[0.0, -1.2], [-2.05, -1.0], [-2.05, 2.3], [2.1, 2.3], [2.1, -1.0]],
+        circuit: vec![[0.0, -1.2], [-2.05, -1.0], [-2.05, 2.3], [2.1, 2.3], [2.1, -1.0]],
         stands: vec![stand(-1.75, 0.6, -2.0), stand(1.8, 0.7, 2.2), stand(-0.5, 2.1, PI), stand(0.7, 2.2, -2.6)],
     }
 }
 
-/// Floor, walls, ceiling, window and lamps.
+/// Adds floor, walls, ceiling, window and lamps.
 fn room(b: &mut Builder) -> Vec<Lamp> {
     let (dx, dy, dz) = (Vec3::x() * (EAST - WEST), Vec3::y() * (NORTH - SOUTH), Vec3::z() * HEIGHT);
     let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
@@ -67,7 +67,7 @@ fn room(b: &mut Builder) -> Vec<Lamp> {
     b.cuboid(corner(0.0, NORTH - 0.01, 0.0), Vec3::new(EAST - WEST, 0.02, 0.09), 0.0, wood);
     b.cuboid(corner(WEST + 0.01, 0.2, 0.0), Vec3::new(NORTH - SOUTH, 0.02, 0.09), FRAC_PI_2, wood);
     b.cuboid(corner(EAST - 0.01, 0.2, 0.0), Vec3::new(NORTH - SOUTH, 0.02, 0.09), FRAC_PI_2, wood);
-    // The window in the east wall is a lamp, too.
+    // The window in the east wall is also a lamp.
     let window = Lamp {
         center: corner(EAST - 0.03, 0.6, 1.6),
         half: [Vec3::y() * 0.9, Vec3::z() * 0.6],
@@ -91,7 +91,7 @@ fn room(b: &mut Builder) -> Vec<Lamp> {
     lamps
 }
 
-/// The desk row and what stands on it.
+/// Adds the desk row and the objects on it.
 fn desks(b: &mut Builder) {
     for x in [-0.78, 0.78] {
         desk(b, Vec3::new(x, 1.0, 0.0), 1.5, 0.8, DESK_TOP);
@@ -128,7 +128,7 @@ fn desks(b: &mut Builder) {
     b.cuboid(on(0.05, 1.30), Vec3::new(0.30, 0.12, 0.34), 0.05, |_| Material::Poster);
 }
 
-/// A plain partition behind the desks, which hides who walks behind it, and what is pinned to it.
+/// Adds a plain partition behind the desks, which hides people behind it, and the papers on it.
 fn partition(b: &mut Builder) {
     b.density = 300.0;
     let grey = [0.60, 0.63, 0.66];
@@ -139,7 +139,7 @@ fn partition(b: &mut Builder) {
     }
 }
 
-/// What stands and hangs along the walls.
+/// Adds the objects along the walls.
 fn surroundings(b: &mut Builder) {
     bookshelf(b, Vec3::new(-2.25, NORTH - 0.16, 0.0), 1.5, 2.05, 5);
     bookshelf(b, Vec3::new(2.45, NORTH - 0.16, 0.0), 1.2, 1.25, 3);

@@ -1,5 +1,5 @@
-//! A damaged hall: bare concrete, pillars with warning stripes, heaps of rubble, a fallen slab, crates, barrels and pipes
-//! under a few lamps. Little texture, many edges.
+//! A damaged hall: bare concrete, pillars with warning stripes, heaps of rubble, a fallen slab, crates, barrels and pipes under a
+//! few lamps. It has little texture and many edges.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion};
 
@@ -17,8 +17,8 @@ const HEIGHT: f32 = 4.4;
 const CONCRETE: [f32; 3] = [0.58, 0.57, 0.55];
 const RUST: [f32; 3] = [0.45, 0.30, 0.22];
 
-/// A way around the large heap for robots and people, which rubble leaves free.
-const ROUND: [[f64; 2]; 6] = [[0.0, -2.3], [-4.3, -2.2], [-4.5, 4.0], [-1.0, 6.3], [4.4, 5.8], [4.6, -2.2]];
+/// A circuit around the large heap for robots and people, which stays free of rubble.
+const CIRCUIT: [[f64; 2]; 6] = [[0.0, -2.3], [-4.3, -2.2], [-4.5, 4.0], [-1.0, 6.3], [4.4, 5.8], [4.6, -2.2]];
 
 pub fn build(seed: u64) -> Scene {
     let mut b = Builder::new(seed);
@@ -51,14 +51,14 @@ pub fn build(seed: u64) -> Scene {
         walk_half_width: 2.1,
         walk_far_y: 0.45,
         walk_near_y: [-1.25, -0.90],
-        round: ROUND.to_vec(),
+        circuit: CIRCUIT.to_vec(),
         company: Company::Ahead,
         seats: vec![crate_seat(-1.52, 0.88, -2.5), crate_seat(1.72, 0.86, 2.6)],
         stands: vec![stand(-0.6, 0.3, 2.9), stand(0.7, 0.25, -2.9), stand(-2.2, 0.0, -2.2), stand(2.5, -0.2, 2.2)],
     }
 }
 
-/// Floor, walls, ceiling beams, lamps.
+/// Adds floor, walls, ceiling beams, lamps.
 fn shell(b: &mut Builder, walls: &[Wall; 4]) -> Vec<Lamp> {
     let (dx, dy) = ((X[1] - X[0]) / 4.0, (Y[1] - Y[0]) / 4.0);
     for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
@@ -97,7 +97,7 @@ fn pillars(b: &mut Builder) {
     }
 }
 
-/// A slab of the roof that leans on the large heap, and pipes across it.
+/// Adds a slab of the roof that leans on the large heap, and pipes across it.
 fn fallen(b: &mut Builder) {
     let tilt = UnitQuaternion::from_euler_angles(0.42, -0.14, 0.35);
     b.density = 240.0;
@@ -117,7 +117,7 @@ fn fallen(b: &mut Builder) {
     }
 }
 
-/// Broken concrete, piled higher towards the middle; the ways stay free.
+/// Adds broken concrete, piled higher towards the middle; the routes stay free.
 fn heap(b: &mut Builder, [x, y]: [f32; 2], radius: f32, height: f32, count: usize) {
     for k in 0..count {
         let (angle, far) = (b.rng.range(0.0, std::f32::consts::TAU), b.rng.range(0.0, 1.0).sqrt());
@@ -127,7 +127,7 @@ fn heap(b: &mut Builder, [x, y]: [f32; 2], radius: f32, height: f32, count: usiz
         if !is_free(at, 0.45 + 0.5 * size.max()) {
             continue;
         }
-        // Later pieces lie on earlier ones.
+        // Later fragments lie on earlier ones.
         let z = height * (1.0 - far).min(0.6) * (k as f32 / count as f32) + 0.08;
         let turn =
             UnitQuaternion::from_euler_angles(b.rng.range(-0.7, 0.7), b.rng.range(-0.7, 0.7), b.rng.range(-3.1, 3.1));
@@ -138,11 +138,11 @@ fn heap(b: &mut Builder, [x, y]: [f32; 2], radius: f32, height: f32, count: usiz
     }
 }
 
-/// Whether something at `place` leaves the round and the ground before the camera free by `margin`.
+/// Returns whether an object at `place` leaves the circuit and the ground before the camera free by `margin`.
 fn is_free(place: [f32; 2], margin: f32) -> bool {
     let [x, y] = place.map(f64::from);
     let margin = f64::from(margin);
-    let sides = ROUND.iter().zip(ROUND.iter().cycle().skip(1));
+    let sides = CIRCUIT.iter().zip(CIRCUIT.iter().cycle().skip(1));
     let off_round = sides.into_iter().all(|(a, b)| {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let t = (((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
@@ -151,7 +151,7 @@ fn is_free(place: [f32; 2], margin: f32) -> bool {
     off_round && (x.abs() > 2.5 + margin || y < -4.0 + margin || y > 0.45 + margin)
 }
 
-/// Crates, barrels and boards: what was stored here.
+/// Adds crates, barrels and boards.
 fn stores(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     let wood = Material::Planks([0.62, 0.47, 0.30]);
     for (x, y, z, size, yaw) in [
@@ -187,11 +187,11 @@ fn stores(b: &mut Builder, [north, east, south, west]: &[Wall; 4]) {
     b.density = 400.0;
     for (wall, s, z) in [(north, 4.4, 2.6), (north, 10.0, 2.4), (east, 6.0, 2.3), (south, 7.2, 2.4), (west, 5.2, 2.3)] {
         let color = b.rng.pick([[0.10, 0.46, 0.28], [0.66, 0.15, 0.13], [0.16, 0.36, 0.62]]);
-        wall.hang(b, [s, z], [0.9, 0.45], Material::Sign(color));
+        wall.attach(b, [s, z], [0.9, 0.45], Material::Sign(color));
     }
     b.density = 260.0;
     north.door(b, 6.3, [2.2, 2.5], [0.40, 0.44, 0.46]);
-    south.hang(b, [3.0, 2.5], [2.2, 2.5], Material::Ribs([0.46, 0.48, 0.47]));
+    south.attach(b, [3.0, 2.5], [2.2, 2.5], Material::Ribs([0.46, 0.48, 0.47]));
     for (wall, s) in [(west, 2.0), (west, 8.5), (east, 3.0), (north, 1.5), (north, 12.0)] {
         wall.mount(b, [s, 0.4], Vec3::new(0.9, 0.22, 1.3), |_| Material::Rusty([0.40, 0.44, 0.42]));
     }

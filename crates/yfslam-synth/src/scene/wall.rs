@@ -1,4 +1,4 @@
-//! Walls, and what hangs on or stands along them, in the wall's own coordinates.
+//! Walls, and objects on and along them, in the coordinates of the wall.
 //!
 //! In: places along a wall. Out: geometry in a [`Builder`].
 
@@ -7,22 +7,22 @@ use crate::mesh::Vec3;
 use crate::texture::Color;
 use crate::texture::material::Material;
 
-/// A wall as one sees it who faces it.
+/// A wall as seen by a person who faces it.
 #[derive(Clone, Copy, Debug)]
 pub struct Wall {
-    /// Its lower left corner, m.
+    /// Lower left corner, m.
     pub corner: Vec3,
     /// Direction to the right, horizontal and unit.
     pub right: Vec3,
-    /// m.
+    /// Length, m.
     pub length: f32,
 }
 
-/// Distance of flat things from the wall, m: enough to keep them apart for any camera.
+/// Distance of flat objects from the wall, m: enough to separate them for any camera.
 const PROUD_M: f32 = 0.012;
 
 impl Wall {
-    /// The four walls of a room, seen from inside: north (far +y), east, south, west.
+    /// Returns the four walls of a room, seen from inside: north (far +y), east, south, west.
     pub fn room(x: [f32; 2], y: [f32; 2]) -> [Self; 4] {
         let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
         let wall = |corner: Vec3, right: Vec3, length: f32| Self { corner, right, length };
@@ -35,7 +35,7 @@ impl Wall {
         ]
     }
 
-    /// The four walls of a block, seen from around it: its south, east, north and west side.
+    /// Returns the four walls of a block, seen from outside: its south, east, north and west side.
     pub fn block(x: [f32; 2], y: [f32; 2]) -> [Self; 4] {
         let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
         let wall = |corner: Vec3, right: Vec3, length: f32| Self { corner, right, length };
@@ -48,22 +48,22 @@ impl Wall {
         ]
     }
 
-    /// Direction out of the wall, towards who faces it.
+    /// Returns the direction out of the wall.
     pub fn normal(&self) -> Vec3 {
         self.right.cross(&Vec3::z())
     }
 
-    /// Angle that turns a box's front (−y) out of the wall.
+    /// Returns the angle that turns the front (−y) of a box out of the wall.
     pub fn yaw(&self) -> f32 {
         self.right.y.atan2(self.right.x)
     }
 
-    /// The point `s` to the right, `z` up and `out` of the wall.
+    /// Returns the point `s` to the right, `z` up and `out` of the wall.
     pub fn at(&self, s: f32, z: f32, out: f32) -> Vec3 {
         self.corner + self.right * s + Vec3::z() * z + self.normal() * out
     }
 
-    /// Part of the wall itself, in panels at most `panel` wide, from height `low` to `high`.
+    /// Adds a part of the wall, in panels at most `panel` wide, from height `low` to `high`.
     pub fn panels(&self, b: &mut Builder, panel: f32, [low, high]: [f32; 2], material: Material) {
         let count = (self.length / panel).ceil().max(1.0);
         let width = self.length / count;
@@ -73,18 +73,18 @@ impl Wall {
         }
     }
 
-    /// Something flat on the wall: its left edge at `s`, its top at `z`.
-    pub fn hang(&self, b: &mut Builder, [s, z]: [f32; 2], [width, height]: [f32; 2], material: Material) {
+    /// Adds a flat object to the wall: its left edge at `s`, its top at `z`.
+    pub fn attach(&self, b: &mut Builder, [s, z]: [f32; 2], [width, height]: [f32; 2], material: Material) {
         b.rectangle(self.at(s, z, PROUD_M), self.right * width, -Vec3::z() * height, material);
     }
 
-    /// A box against the wall: middle at `s`, underside at `z`, size along, out of and up the wall.
+    /// Adds a box against the wall: middle at `s`, underside at `z`, size along, out of and up the wall.
     pub fn mount(&self, b: &mut Builder, [s, z]: [f32; 2], size: Vec3, material: impl Fn(Side) -> Material) {
         let base = self.at(s, z, 0.5 * size.y + 0.5 * PROUD_M);
         b.cuboid(base, size, self.yaw(), material);
     }
 
-    /// A door in its frame, proud of the skirting: left edge at `s`.
+    /// Adds a door in its frame, in front of the skirting: left edge at `s`.
     pub fn door(&self, b: &mut Builder, s: f32, [width, height]: [f32; 2], color: Color) {
         let place = [s + width / 2.0, 0.0];
         self.mount(b, place, Vec3::new(width, 0.05, height), |side| match side {

@@ -1,20 +1,20 @@
-//! Motion blur: what the camera's own motion smears while the shutter is open.
+//! Motion blur by the motion of the camera while the shutter is open.
 //!
-//! In: linear colour, exact depth, the camera's velocity. Out: linear colour. A point P of the camera's frame moves with
-//! −(v + ω × P) and its image with the derivative of the projection (Longuet-Higgins and Prazdny, "The interpretation of a moving
-//! retinal image", 1980); the colour is the mean along that path. What actors move by themselves is not smeared.
+//! In: linear colour, exact depth, the velocity of the camera. Out: linear colour. A point P of the camera frame moves with −(v + ω
+//! × P) and its image with the derivative of the projection (Longuet-Higgins and Prazdny, "The interpretation of a moving retinal
+//! image", 1980); the colour is the mean along that path. The motion of actors is not blurred.
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 
 use crate::render::rays::RayTable;
 
-/// Paths shorter than this are not smeared, px.
+/// Paths shorter than this are not blurred, px.
 const LEAST_PX: f32 = 0.3;
-/// Most places along a path.
+/// Largest number of samples along a path.
 const MOST_SAMPLES: f32 = 16.0;
 
-/// Motion of the camera while the shutter is open, in its own coordinates.
+/// Motion of the camera while the shutter is open, in the camera frame.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraMove {
     /// Translation, m.
@@ -24,13 +24,13 @@ pub struct CameraMove {
 }
 
 impl CameraMove {
-    /// From the poses (world from camera) when the shutter opens and when it closes.
+    /// Computes the motion from the poses (world from camera) at the opening and closing of the shutter.
     pub fn between(open: &Isometry3<f64>, close: &Isometry3<f64>) -> Self {
         let moved = open.inverse() * close;
         Self { translation: moved.translation.vector.cast(), rotation: moved.rotation.scaled_axis().cast() }
     }
 
-    /// Path of the image of the point at depth `z` on the ray (x, y, 1), in normalised coordinates.
+    /// Returns the path of the image of the point at depth `z` on the ray (x, y, 1), in normalised coordinates.
     fn path(&self, x: f32, y: f32, z: f32) -> [f32; 2] {
         let point = Vector3::new(x * z, y * z, z);
         let v = -(self.translation + self.rotation.cross(&point));
@@ -38,7 +38,7 @@ impl CameraMove {
     }
 }
 
-/// Smears `color` (row-major, as the rays) along the paths of its points; pixels without depth stay.
+/// Blurs `color` (row-major, like the rays) along the paths of its points; pixels without depth stay.
 pub fn smear(color: &[[f32; 3]], depth: &[f32], rays: &RayTable, motion: &CameraMove) -> Vec<[f32; 3]> {
     let width = rays.width;
     let mut out = color.to_vec();
@@ -59,7 +59,7 @@ pub fn smear(color: &[[f32; 3]], depth: &[f32], rays: &RayTable, motion: &Camera
     out
 }
 
-/// Mean colour along the path `d`, centred at `at`.
+/// Returns the mean colour along the path `d`, centred at `at`.
 fn mean_along(color: &[[f32; 3]], width: usize, at: [f32; 2], d: [f32; 2], length: f32) -> [f32; 3] {
     let samples = (length.ceil() + 1.0).min(MOST_SAMPLES);
     let mut sum = [0.0; 3];
@@ -71,7 +71,7 @@ fn mean_along(color: &[[f32; 3]], width: usize, at: [f32; 2], d: [f32; 2], lengt
     sum.map(|value| value / samples)
 }
 
-/// Bilinear interpolation, held at the border.
+/// Interpolates bilinearly; positions are clamped at the border.
 fn between_pixels(color: &[[f32; 3]], width: usize, x: f32, y: f32) -> [f32; 3] {
     let height = color.len() / width;
     let (x, y) = (x.clamp(0.0, (width - 1) as f32), y.clamp(0.0, (height - 1) as f32));
@@ -88,7 +88,7 @@ mod tests {
     use crate::config::default_camera;
     use yfslam::Camera;
 
-    /// A white dot in the middle, at 2 m, seen by a camera that moves by `motion`; its width and height where it exceeds a tenth.
+    /// Returns the width, height and sum of a white dot at 2 m after blurring by `motion`, where it exceeds a tenth.
     fn smeared_dot(motion: Isometry3<f64>) -> (usize, usize, f32) {
         let camera = Camera { width: 64, height: 48, cx: 32.0, cy: 24.0, ..default_camera() };
         let mut color = vec![[0.0; 3]; 64 * 48];

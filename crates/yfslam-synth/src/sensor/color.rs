@@ -1,4 +1,4 @@
-//! Colour as the camera delivers it: gamma, noise, eight bits.
+//! Colour images of the camera: gamma, noise, eight bits.
 //!
 //! In: linear RGB. Out: an [`RgbImage`].
 
@@ -22,9 +22,9 @@ pub fn develop(linear: &[[f32; 3]], width: usize, height: usize, exposure: f32, 
     image
 }
 
-/// Grey level of a linear value plus noise.
+/// Returns the grey level of a linear value plus noise.
 fn level(linear: f32, noise: f32) -> u8 {
-    // Straight up to 0.7, then towards 1 with continuous slope, as film and cameras do.
+    // Linear up to 0.7, then towards 1 with continuous slope, as in film and cameras.
     const KNEE: f32 = 0.7;
     let x = linear.max(0.0);
     let x = if x > KNEE { 1.0 - (1.0 - KNEE) * (1.0 - KNEE) / (x - KNEE + 1.0 - KNEE) } else { x };

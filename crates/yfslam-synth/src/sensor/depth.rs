@@ -1,20 +1,20 @@
-//! Depth as a structured-light sensor measures it: noise, disparity steps, range; holes in the shadow of the projector, at edges, on
+//! Depth images of a structured-light sensor: noise, disparity steps, range; holes in the shadow of the projector, at edges, on
 //! grazing and on dark surfaces.
 //!
-//! In: exact depth in metres and reflectance. Out: a [`DepthImage`] in sensor units, 0 where nothing was measured. Sources of the figures
-//! are in [`SensorConfig`].
+//! In: exact depth in metres and reflectance. Out: a [`DepthImage`] in sensor units, 0 without measurement. The sources of the
+//! constants are in [`SensorConfig`].
 
 use rayon::prelude::*;
 use yfslam::Camera;
 use yfslam::image::{DepthImage, Image};
 
 use crate::config::SensorConfig;
-use crate::render::Picture;
+use crate::render::Rendering;
 use crate::render::rays::RayTable;
 use crate::rng::{hash, normals4};
 
-/// Measures the exact depth of a picture.
-pub fn measure(exact: &Picture, rays: &RayTable, camera: &Camera, sensor: &SensorConfig, seed: u64) -> DepthImage {
+/// Measures the exact depth of a rendering.
+pub fn measure(exact: &Rendering, rays: &RayTable, camera: &Camera, sensor: &SensorConfig, seed: u64) -> DepthImage {
     let (width, bf) = (camera.width, camera.bf as f32);
     let least_cosine = sensor.max_angle_deg.to_radians().cos();
     let by_angle = sensor.max_angle_deg < 90.0 || sensor.depth_noise_angle > 0.0 || sensor.min_return > 0.0;
@@ -37,8 +37,7 @@ pub fn measure(exact: &Picture, rays: &RayTable, camera: &Camera, sensor: &Senso
                 }
                 let measured = disturb(z, bf, cosine, sensor, draws[0]);
                 if (sensor.min_depth_m..=sensor.max_depth_m).contains(&measured) {
-                    // Depth beyond the sixteen bits is no depth.
-                    // Rounds half up; `round` is a library call on older processors.
+                    // Depth that exceeds sixteen bits is not measured.
                     let value = f64::from(measured) * camera.depth_factor + 0.5;
                     *unit = if value < 65_536.0 { value as u16 } else { 0 };
                 }
@@ -48,12 +47,12 @@ pub fn measure(exact: &Picture, rays: &RayTable, camera: &Camera, sensor: &Senso
     DepthImage { raw, metres_per_unit: (1.0 / camera.depth_factor) as f32 }
 }
 
-/// Relative spread of the angle and of the returned light at which depth is lost: holes have ragged borders.
+/// Relative spread of the angle and of the returned light at which depth is lost, which gives holes a ragged border.
 const ANGLE_SPREAD: f32 = 0.15;
 const RETURN_SPREAD: f32 = 0.2;
 
-/// Cosine of the angle between the surface's normal and the ray, from the inverse depths around the pixel: the plane n·P = 1 has
-/// 1/z = n·(x, y, 1). Depth edges look like steep surfaces, and lose their depth as such.
+/// Returns the cosine of the angle between the surface normal and the ray, from the inverse depths around the pixel: the plane n·P
+/// = 1 has 1/z = n·(x, y, 1). Depth edges appear as steep surfaces and lose their depth.
 fn cosine(depth: &[f32], rays: &RayTable, row: usize, column: usize) -> f32 {
     let (width, height) = (rays.width, rays.height);
     let inverse = |row: usize, column: usize| {
@@ -86,13 +85,13 @@ fn disturb(z: f32, bf: f32, cosine: f32, sensor: &SensorConfig, normal: f32) -> 
     }
 }
 
-/// Cosine of 60°: flatter surfaces show no effect of the angle (Nguyen et al. 2012; see [`SensorConfig::depth_noise_angle`]).
+/// Cosine of 60°: flatter surfaces have no effect of the angle (Nguyen et al. 2012; see [`SensorConfig::depth_noise_angle`]).
 const STEEP_COSINE: f32 = 0.5;
 
-/// Which pixels of a row the projector reaches. It stands to the right of the camera by the baseline: a point at column
-/// x and depth z lies at x − bf/z in its view, and is hidden if a pixel farther right lies at or left of that.
+/// Returns which pixels of a row the projector reaches. It is to the right of the camera by the baseline: a point at column x and
+/// depth z is at x − bf/z in its view, and is hidden if a pixel farther right is at or left of that.
 fn lit_by_projector(line: &[f32], bf: f32) -> Vec<bool> {
-    // A surface's own slope must not hide it: a hidden point is hidden by at least this many pixels.
+    // The slope of a surface must not hide the surface: a hidden point is hidden by at least this many pixels.
     const MARGIN_PX: f32 = 1.0;
     let mut lit = vec![true; line.len()];
     let mut leftmost = f32::INFINITY;
@@ -115,11 +114,11 @@ mod tests {
         Camera { width: 200, height: 100, ..default_camera() }
     }
 
-    /// Measures surfaces of this depth and reflectance.
+    /// Measures surfaces of the given depth and reflectance.
     fn measured(exact: Vec<f32>, reflectance: f32, sensor: &SensorConfig) -> DepthImage {
         let pixels = exact.len();
-        let picture = Picture { depth: exact, reflectance: vec![reflectance; pixels], ..Picture::default() };
-        measure(&picture, &RayTable::new(&camera()), &camera(), sensor, 1)
+        let rendering = Rendering { depth: exact, reflectance: vec![reflectance; pixels], ..Rendering::default() };
+        measure(&rendering, &RayTable::new(&camera()), &camera(), sensor, 1)
     }
 
     fn missing(image: &DepthImage) -> f64 {
@@ -127,8 +126,8 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_loses_its_depth_when_seen_at_a_grazing_angle() {
-        // A wall through (0, 0, 2) whose normal makes `degrees` with the axis of a camera of long focal length.
+    fn a_wall_has_no_depth_at_a_grazing_angle() {
+        // A wall through (0, 0, 2) whose normal has the angle `degrees` to the axis of a camera with a long focal length.
         let wall = |degrees: f32| -> Vec<f32> {
             let slope = degrees.to_radians().tan();
             (0..20_000).map(|i| 2.0 / (1.0 - slope * ((i % 200) as f32 - 100.0) / 20_000.0)).collect()
@@ -136,9 +135,9 @@ mod tests {
         let long = Camera { fx: 20_000.0, fy: 20_000.0, cx: 100.0, cy: 50.0, ..camera() };
         let lost = |degrees: f32| {
             let depth = wall(degrees);
-            let picture = Picture { reflectance: vec![0.5; depth.len()], depth, ..Picture::default() };
+            let rendering = Rendering { reflectance: vec![0.5; depth.len()], depth, ..Rendering::default() };
             let sensor = SensorConfig { max_angle_deg: 80.0, ..SensorConfig::perfect() };
-            missing(&measure(&picture, &RayTable::new(&long), &long, &sensor, 1))
+            missing(&measure(&rendering, &RayTable::new(&long), &long, &sensor, 1))
         };
         assert_eq!((lost(0.0), lost(60.0)), (0.0, 0.0));
         assert!((0.2..0.8).contains(&lost(80.0)), "{}", lost(80.0));
@@ -146,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dark_surface_loses_its_depth_when_it_is_far() {
+    fn a_dark_surface_has_no_depth_when_it_is_far() {
         let sensor = SensorConfig { min_return: 0.005, ..SensorConfig::perfect() };
         let lost = |reflectance: f32, z: f32| missing(&measured(vec![z; 20_000], reflectance, &sensor));
         assert_eq!((lost(0.5, 4.5), lost(0.04, 1.5)), (0.0, 0.0));
@@ -183,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_near_object_shades_the_background_to_its_left_as_wide_as_the_difference_of_disparities() {
+    fn a_near_object_hides_the_background_to_its_left_over_the_difference_of_disparities() {
         let exact: Vec<f32> = (0..20_000).map(|i| if (80..120).contains(&(i % 200)) { 1.0 } else { 2.0 }).collect();
         let sensor = SensorConfig { holes: true, ..SensorConfig::perfect() };
         let image = measured(exact, 0.5, &sensor);

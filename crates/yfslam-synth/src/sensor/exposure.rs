@@ -1,7 +1,7 @@
-//! Automatic exposure: the gain follows the brightness that the camera has metered lately.
+//! Automatic exposure: the gain follows the recently measured brightness.
 //!
-//! In: a time and a way to meter the scene. Out: a gain, 1 at the start. The scene is metered every [`STEP_S`] only and each reading is
-//! kept, so that any frame can be made at any time, and all of them cost little.
+//! In: a time and a function that measures the brightness of the scene. Out: a gain, 1 at the start. The scene is measured only
+//! every [`STEP_S`] and each reading is kept, so that frames can be rendered in any order at little cost.
 
 use std::sync::OnceLock;
 
@@ -9,30 +9,30 @@ use crate::rng::{hash, normals4};
 
 /// Time between two readings, s.
 const STEP_S: f64 = 0.2;
-/// Weight of a reading that is 0, 1, 2, 3 steps old: about half a second to settle, as webcams do.
+/// Weight of a reading that is 0, 1, 2, 3 steps old: the gain settles in about half a second, as in webcams.
 const WEIGHTS: [f32; 4] = [0.4, 0.3, 0.2, 0.1];
 /// Least and greatest gain.
 const RANGE: [f32; 2] = [0.5, 2.0];
 /// Relative error of a reading.
 const METER_NOISE: f32 = 0.01;
 
-/// Readings so far.
+/// The readings.
 #[derive(Debug)]
 pub struct Meter {
     readings: Vec<OnceLock<f32>>,
     seed: u64,
-    /// Share of a change of brightness that the gain makes up for.
+    /// Share of a change of brightness that the gain compensates.
     strength: f32,
 }
 
 impl Meter {
-    /// For a sequence of `seconds`; a strength of 0 keeps the gain at 1.
+    /// Creates the meter for a sequence of `seconds`; a strength of 0 keeps the gain at 1.
     pub fn new(seconds: f64, strength: f32, seed: u64) -> Self {
         let count = if strength > 0.0 { (seconds / STEP_S) as usize + 2 } else { 0 };
         Self { readings: (0..count).map(|_| OnceLock::new()).collect(), seed, strength }
     }
 
-    /// Gain at `time` seconds; `brightness` meters the scene at a time.
+    /// Returns the gain at `time` seconds; `brightness` measures the scene at a time.
     pub fn gain(&self, time: f64, brightness: impl Fn(f64) -> f32) -> f32 {
         if self.strength <= 0.0 {
             return 1.0;
@@ -49,7 +49,7 @@ impl Meter {
             let seen = WEIGHTS.iter().enumerate().map(|(age, weight)| weight * read(step.saturating_sub(age)));
             (start / seen.sum::<f32>()).powf(self.strength).clamp(RANGE[0], RANGE[1])
         };
-        // From the gain of the last reading to that of this one: gains change without steps.
+        // Interpolated between the gains of the last two readings, so that gains change without steps.
         let (step, part) = ((time / STEP_S).max(0.0) as usize, (time / STEP_S).max(0.0).fract() as f32);
         settled(step.saturating_sub(1)) * (1.0 - part) + settled(step) * part
     }
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_gain_makes_up_for_a_change_of_brightness_without_steps_and_in_any_order() {
+    fn the_gain_compensates_a_change_of_brightness_without_steps_and_in_any_order() {
         let brightness = |t: f64| if t < 2.0 { 0.2 } else { 0.4 };
         let gains = |order: &mut dyn Iterator<Item = usize>| {
             let meter = Meter::new(4.0, 0.8, 3);

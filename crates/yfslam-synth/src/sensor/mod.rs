@@ -1,5 +1,5 @@
-//! The sensor: what exposure, noise, quantisation and holes make of an exact picture. Every draw is a hash of seed, frame and
-//! pixel, so that any frame can be made at any time.
+//! The sensor: adds the effects of exposure, noise, quantisation and holes to an exact rendering. Every random draw is a hash of
+//! seed, frame and pixel, so that frames can be rendered in any order.
 
 pub mod blur;
 pub mod color;

@@ -1,4 +1,4 @@
-//! What buildings are made of: concrete, painted walls, floors, doors, signs, radiators, crates, rust.
+//! Materials of buildings: concrete, painted walls, floors, doors, signs, radiators, crates, rust.
 //!
 //! In: a canvas, metres per texel `m` and a seed. Out: the painted canvas.
 
@@ -13,7 +13,7 @@ fn size(canvas: &Canvas) -> (f32, f32) {
     (canvas.width() as f32, canvas.height() as f32)
 }
 
-/// A crooked line of short pieces, as cracks and scratches are.
+/// Draws a crooked line of short segments, like cracks and scratches.
 fn crack(canvas: &mut Canvas, m: f32, color: Color, rng: &mut Rng) {
     let (w, h) = size(canvas);
     let mut from = [rng.range(0.0, w), rng.range(0.0, h)];
@@ -94,7 +94,7 @@ pub(super) fn door(canvas: &mut Canvas, color: Color, m: f32, seed: u64, rng: &m
         let inside = x > leaf[0] && x < leaf[0] + leaf[2] && y > leaf[1] && y < leaf[1] + leaf[3];
         if inside { tint(color, 1.0 + 0.25 * (grain - 0.5)) } else { old }
     });
-    // Handle and lock on the right, kick plate below, a plate with the number beside eye level.
+    // Handle and lock on the right, kick plate below, a plate with the number at eye level.
     let metal = [0.80, 0.80, 0.82];
     let (x, y) = (w - frame - 0.09 / m, 1.05 / m);
     canvas.rect(x, h - y - 0.08 / m, 0.045 / m, 0.22 / m, tint(metal, 0.85));
@@ -192,7 +192,7 @@ pub(super) fn notice_board(canvas: &mut Canvas, m: f32, seed: u64, rng: &mut Rng
         canvas.rect(x, y, pw, ph, ground);
         print::word(canvas, x + 0.1 * pw, y + 0.07 * ph, 0.6 * pw, tint(print::ink(rng), 0.8), rng);
         if rng.chance(0.5) {
-            print::picture(canvas, [x + 0.1 * pw, y + 0.25 * ph, 0.8 * pw, 0.35 * ph], rng);
+            print::illustration(canvas, [x + 0.1 * pw, y + 0.25 * ph, 0.8 * pw, 0.35 * ph], rng);
         }
         let text = [x + 0.1 * pw, y + 0.64 * ph, 0.8 * pw, 0.3 * ph];
         print::paragraph(canvas, text, 0.011 / m, tint(BLACK, 2.0), rng);
@@ -245,7 +245,7 @@ pub(super) fn rusty(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
     canvas.shade_with(fields, |_, y, _, [spread, grain]| {
         let rust = [0.46, 0.29, 0.19];
         let eaten = ((spread - 0.52) * 9.0).clamp(0.0, 1.0);
-        // Two beads run around a barrel.
+        // Two beads around a barrel.
         let bead = if (y / h - 0.33).abs() < 0.015 || (y / h - 0.67).abs() < 0.015 { 0.6 } else { 1.0 };
         tint(blend(color, rust, eaten), bead * (0.8 + 0.4 * grain))
     });

@@ -1,9 +1,9 @@
-//! A canvas to paint textures on: filled shapes and text in pixels, every colour in gamma-2 space.
+//! A canvas for painting textures: filled shapes and text in pixels, every colour in gamma-2 space.
 
 use super::noise::Field;
 use super::{Color, font};
 
-/// Colour picture of f32 channels, row-major, top row first.
+/// Colour image of f32 channels, row-major, top row first.
 #[derive(Clone, Debug)]
 pub struct Canvas {
     width: usize,
@@ -12,28 +12,28 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A black canvas of at least one pixel.
+    /// Creates a black canvas of at least one pixel.
     pub fn new(width: usize, height: usize) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { width, height, pixels: vec![[0.0; 3]; width * height] }
     }
 
-    /// Pixels per row.
+    /// Returns the number of pixels per row.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// All pixels.
+    /// Returns all pixels.
     pub fn pixels(&self) -> &[Color] {
         &self.pixels
     }
 
-    /// Covers everything with one colour.
+    /// Fills the canvas with one colour.
     pub fn fill(&mut self, color: Color) {
         self.pixels.fill(color);
     }
@@ -43,12 +43,12 @@ impl Canvas {
         self.shade_within(0.0, 0.0, self.width as f32, self.height as f32, shade);
     }
 
-    /// Fractal noise for this canvas whose pixels are `step` cells wide and high.
+    /// Returns fractal noise for this canvas; pixels are `step` cells wide and high.
     pub fn field(&self, seed: u64, step: [f32; 2], octaves: u32) -> Field {
         Field::new(seed, self.width, step, octaves)
     }
 
-    /// [`Canvas::shade`] with the values of noise fields at the pixel: `shade(x, y, old, values)`.
+    /// Applies [`Canvas::shade`] with the values of noise fields at the pixel: `shade(x, y, old, values)`.
     pub fn shade_with<const N: usize>(
         &mut self,
         mut fields: [Field; N],
@@ -63,7 +63,7 @@ impl Canvas {
         }
     }
 
-    /// [`Canvas::shade`] for the pixels whose centres lie in the rectangle.
+    /// Applies [`Canvas::shade`] to the pixels whose centres lie in the rectangle.
     pub fn shade_within(&mut self, x: f32, y: f32, w: f32, h: f32, shade: impl Fn(f32, f32, Color) -> Color) {
         let clip = |from: f32, to: f32, size: usize| {
             ((from - 0.5).ceil().max(0.0) as usize, ((to - 0.5).ceil().max(0.0) as usize).min(size))
@@ -122,7 +122,7 @@ impl Canvas {
         }
     }
 
-    /// Writes `text` downwards, turned by a quarter to the right as on the spine of a book; (x, y) is the top right.
+    /// Writes `text` downward, turned by a quarter to the right as on the spine of a book; (x, y) is the top right.
     pub fn text_down(&mut self, x: f32, y: f32, cell: f32, text: &str, color: Color) {
         for (index, letter) in text.chars().enumerate() {
             let top = y + index as f32 * cell * 4.0;

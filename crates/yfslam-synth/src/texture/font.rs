@@ -1,4 +1,4 @@
-//! A capital font of 3 × 5 cells: its sharp corners are what corner detectors like.
+//! A capital font of 3 × 5 cells, whose sharp corners suit corner detectors.
 //!
 //! In: a character. Out: five rows of three bits. Unknown characters are blank.
 
@@ -15,7 +15,7 @@ pub const WORDS: [&str; 24] = [
     "STATICS", "MOTION", "LINEAR", "SIGNAL", "FOURIER", "GAUSS", "EULER", "RUST", "KALMAN", "PRISM", "ATLAS", "FIELD",
 ];
 
-/// Whether the cell in column `x` (0 to 2) and row `y` (0 to 4) of `letter` is inked.
+/// Returns whether the cell in column `x` (0 to 2) and row `y` (0 to 4) of `letter` is inked.
 pub fn inked(letter: char, x: u32, y: u32) -> bool {
     let bits = match letter {
         'A'..='Z' => LETTERS[letter as usize - 'A' as usize],

@@ -1,7 +1,7 @@
-//! What surfaces are made of: each material paints its own, never repeating texture.
+//! Materials of surfaces: each paints its own texture, which never repeats.
 //!
-//! In: a material, the surface's size and a seed. Out: a painted [`Canvas`]. Lengths inside are metres turned into
-//! texels, so that grain and print have their natural size.
+//! In: a material, the size of the surface and a seed. Out: a painted [`Canvas`]. Lengths are converted from metres to texels, so
+//! that grain and print have their natural size.
 
 use super::canvas::Canvas;
 use super::noise::cell;
@@ -38,7 +38,7 @@ pub enum Material {
     Plain(Color),
     /// Acoustic ceiling tiles.
     Ceiling,
-    /// A printed poster: title, pictures, diagrams, text.
+    /// A printed poster: title, illustrations, diagrams, text.
     Poster,
     /// A sheet of printed paper.
     Paper,
@@ -66,7 +66,7 @@ pub enum Material {
     Shirt(Color, Color, Pattern),
     /// Skin.
     Skin(Color),
-    /// A face and the hair around it; with a beard or without.
+    /// A face and the hair around it, with or without a beard.
     Head(Color, Color, bool),
     /// Hair.
     Hair(Color),
@@ -90,14 +90,14 @@ pub enum Material {
     Ribs(Color),
     /// The planks of a crate.
     Planks(Color),
-    /// Lacquer that rust has eaten into.
+    /// Rusty lacquer.
     Rusty(Color),
     /// A double power socket.
     Socket,
 }
 
 impl Material {
-    /// Density of texels that the material needs, relative to printed matter.
+    /// Returns the density of texels that the material needs, relative to printed matter.
     pub fn detail(&self) -> f32 {
         match self {
             Self::Plain(_) | Self::Pages | Self::Hair(_) | Self::Skin(_) => 0.4,
@@ -152,12 +152,12 @@ impl Material {
     }
 }
 
-/// `color` scaled by `factor`.
+/// Returns `color` scaled by `factor`.
 pub fn tint(color: Color, factor: f32) -> Color {
     color.map(|c| c * factor)
 }
 
-/// Blend from `a` to `b`.
+/// Blends from `a` to `b`.
 pub fn blend(a: Color, b: Color, t: f32) -> Color {
     std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)
 }

@@ -1,7 +1,7 @@
-//! Textures: painted once when the world is built, then read with trilinear filtering.
+//! Textures: painted once, then read with trilinear filtering.
 //!
-//! In: painted canvases. Out: mip chains and filtered colours. Colours are stored and filtered in "gamma 2" space: the
-//! stored value is the square root of linear light, close to sRGB, so that eight bits suffice and decoding is a square.
+//! In: painted canvases. Out: mip chains and filtered colours. Colours are stored and filtered in "gamma 2" space: the stored value
+//! is the square root of linear light, close to sRGB, so that eight bits suffice and decoding is a square.
 
 mod building;
 pub mod canvas;
@@ -26,7 +26,7 @@ struct Level {
     texels: Vec<[u8; 4]>,
 }
 
-/// A picture with its mip chain, each level half the size of the one before.
+/// An image with its mip chain, each level half the size of the one before.
 #[derive(Clone, Debug)]
 pub struct Texture {
     levels: Vec<Level>,
@@ -56,19 +56,19 @@ impl Texture {
         Self { coarsest: (levels.len() - 1) as f32, levels }
     }
 
-    /// Size of the finest level in texels.
+    /// Returns the size of the finest level, texels.
     pub fn size(&self) -> [f32; 2] {
         self.levels[0].size
     }
 
-    /// Mean of linear light over the whole texture and its channels.
+    /// Returns the mean of linear light over the whole texture and its channels.
     pub fn mean(&self) -> f32 {
         let [r, g, b, _] = self.sample(0.5, 0.5, self.coarsest);
         (r * r + g * g + b * b) / 3.0
     }
 
-    /// Gamma-2 colour at (u, v), clamped to [0, 1]²; `lod` is the mip level, 0 the finest, fractions blend two levels.
-    /// The fourth channel is unused: four lanes fill a vector register.
+    /// Returns the gamma-2 colour at (u, v), clamped to [0, 1]²; `lod` is the mip level, 0 the finest, and fractions blend two
+    /// levels. The fourth channel is unused: four lanes fill a vector register.
     #[inline]
     pub fn sample(&self, u: f32, v: f32, lod: f32) -> [f32; 4] {
         // `max` and `min` compile to single instructions, `clamp` and casts to unsigned do not.
@@ -76,7 +76,7 @@ impl Texture {
         let fine = lod as i32 as usize;
         let blend = lod - fine as f32;
         let a = self.levels[fine].bilinear(u, v);
-        // Magnified surfaces, the most frequent case close up, need one level only.
+        // Magnified surfaces, the most frequent case, need one level only.
         if blend < 1.0 / 64.0 {
             return a;
         }

@@ -9,13 +9,13 @@ fn lattice(seed: u64, x: i32, y: i32) -> f32 {
     (mix(seed ^ key.wrapping_mul(0x9e37_79b9_7f4a_7c15)) >> 40) as f32 / 16_777_216.0
 }
 
-/// Rounds down without the library call that `f32::floor` is on processors older than SSE4.1.
+/// Rounds down without the library call of `f32::floor` on processors older than SSE4.1.
 fn floor(x: f32) -> i32 {
     let towards_zero = x as i32;
     towards_zero - i32::from((towards_zero as f32) > x)
 }
 
-/// Smooth value noise in [0, 1] with cells of size one.
+/// Returns smooth value noise in [0, 1] with cells of size one.
 pub fn value(seed: u64, x: f32, y: f32) -> f32 {
     let (i, j) = (floor(x), floor(y));
     let (fx, fy) = (fade(x - i as f32), fade(y - j as f32));
@@ -24,7 +24,7 @@ pub fn value(seed: u64, x: f32, y: f32) -> f32 {
     top * (1.0 - fy) + bottom * fy
 }
 
-/// Sum of `octaves` of value noise, each twice as fine and half as strong; in [0, 1], mean 1/2.
+/// Returns the sum of `octaves` of value noise, each twice as fine and half as strong; in [0, 1], mean 1/2.
 pub fn fractal(seed: u64, x: f32, y: f32, octaves: u32) -> f32 {
     let (mut sum, mut weight, mut total, mut scale) = (0.0, 1.0, 0.0, 1.0);
     for octave in 0..octaves {
@@ -36,8 +36,8 @@ pub fn fractal(seed: u64, x: f32, y: f32, octaves: u32) -> f32 {
     if total > 0.0 { sum / total } else { 0.5 }
 }
 
-/// [`fractal`] at the pixel centres of a canvas, row by row: a lattice value is hashed once per row of cells instead of
-/// four times per pixel, and most of what remains are linear blends.
+/// [`fractal`] at the pixel centres of a canvas, row by row: a lattice value is hashed once per row of cells instead of four times
+/// per pixel, and the rest is mostly linear blends.
 #[derive(Clone, Debug)]
 pub struct Field {
     octaves: Vec<Octave>,
@@ -48,7 +48,7 @@ pub struct Field {
 struct Octave {
     seed: u64,
     weight: f32,
-    /// Cells per pixel downwards.
+    /// Cells per pixel in y.
     step: f32,
     /// Cell and place within it (faded) of every column.
     columns: Vec<(u32, f32)>,
@@ -63,7 +63,7 @@ fn fade(t: f32) -> f32 {
 }
 
 impl Field {
-    /// The noise for a canvas of `width` pixels, of which each is `step` cells wide and high.
+    /// Creates the noise for a canvas of `width` pixels, each `step` cells wide and high.
     pub fn new(seed: u64, width: usize, step: [f32; 2], octaves: u32) -> Self {
         let total = 2.0 - 0.5f32.powi(octaves as i32 - 1);
         let octave = |k: u32| {
@@ -87,7 +87,7 @@ impl Field {
         Self { octaves: (0..octaves).map(octave).collect(), row: vec![0.0; width] }
     }
 
-    /// The values along row `y`.
+    /// Returns the values along row `y`.
     pub fn row(&mut self, y: usize) -> &[f32] {
         self.row.fill(0.0);
         for octave in &mut self.octaves {
@@ -123,7 +123,7 @@ impl Octave {
     }
 }
 
-/// White noise per cell in [0, 1].
+/// Returns white noise per cell in [0, 1].
 pub fn cell(seed: u64, x: f32, y: f32) -> f32 {
     lattice(seed, floor(x), floor(y))
 }

@@ -1,4 +1,4 @@
-//! Skin, faces, hair and clothes. On what goes once around a body, u = 1/4 is its front and u = 3/4 its back.
+//! Skin, faces, hair and clothes. On textures that go once around a body, u = 1/4 is the front and u = 3/4 the back.
 
 use super::canvas::Canvas;
 use super::material::{Pattern, blend, tint};
@@ -6,11 +6,11 @@ use super::noise::{cell, fractal};
 use super::{Color, print};
 use crate::rng::Rng;
 
-/// Weave and creases: multiplies a colour at (x, y) metres.
+/// Returns weave and creases, a factor for the colour at (x, y) metres.
 fn creases(seed: u64, x: f32, y: f32) -> f32 {
     let weave = cell(seed, x * 330.0, y * 330.0) - 0.5;
     let bend = fractal(seed ^ 2, x * 3.0, y * 3.0, 2);
-    // Ridges: creases are narrow and dark, the cloth between them wide and bright.
+    // Creases are narrow and dark, the cloth between them is wide and bright.
     let ridge = (fractal(seed ^ 1, x * 7.0 + 1.5 * bend, y * 4.5 + 2.0 * bend, 3) - 0.5).abs();
     let crease = (1.0 - ridge * 9.0).max(0.0);
     let soft = fractal(seed ^ 3, x * 5.0, y * 3.0, 3) - 0.5;
@@ -96,7 +96,7 @@ pub(super) fn shirt(canvas: &mut Canvas, [base, accent]: [Color; 2], pattern: Pa
     canvas.shade(|x, y, old| tint(old, creases(seed, x * m, y * m)));
 }
 
-/// Soft bump: 1 at `t` = 0, 0 from |t| = 1 on.
+/// Returns a soft bump: 1 at `t` = 0, 0 from |t| = 1 on.
 fn bump(t: f32) -> f32 {
     let s = (1.0 - t * t).max(0.0);
     s * s
@@ -151,7 +151,7 @@ pub(super) fn head(canvas: &mut Canvas, skin: Color, hair: Color, beard: bool, s
     });
 }
 
-/// Where hair begins, as v, at a distance `side` in u from the middle of the face.
+/// Returns the v at which the hair begins, at a distance `side` in u from the middle of the face.
 pub fn hairline(side: f32) -> f32 {
     let step = |from: f32, to: f32, t: f32| {
         let t = ((t - from) / (to - from)).clamp(0.0, 1.0);

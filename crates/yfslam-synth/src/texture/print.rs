@@ -1,5 +1,5 @@
-//! Printed matter: posters, books, paper, boxes, screens, keyboards, whiteboards. Rectangles and letters of many sizes
-//! give corners at every scale.
+//! Printed matter: posters, books, paper, boxes, screens, keyboards, whiteboards. Rectangles and letters of many sizes give corners
+//! at every scale.
 
 use super::Color;
 use super::canvas::Canvas;
@@ -22,13 +22,13 @@ const INKS: [Color; 9] = [
 pub(super) const WHITE: Color = [0.95, 0.95, 0.93];
 pub(super) const BLACK: Color = [0.10, 0.10, 0.11];
 
-/// One of the printing colours.
+/// Returns one of the printing colours.
 pub fn ink(rng: &mut Rng) -> Color {
     let factor = rng.range(0.8, 1.15);
     tint(rng.pick(INKS), factor)
 }
 
-/// A random word that fills the width; returns its height.
+/// Writes a random word that fills the width; returns its height.
 pub fn word(canvas: &mut Canvas, x: f32, y: f32, width: f32, color: Color, rng: &mut Rng) -> f32 {
     let text = rng.pick(WORDS);
     let cell = width / (text.len() as f32 * 4.0 - 1.0);
@@ -36,7 +36,7 @@ pub fn word(canvas: &mut Canvas, x: f32, y: f32, width: f32, color: Color, rng: 
     5.0 * cell
 }
 
-/// Lines of words like print, `line` high each.
+/// Writes lines of words like print, each `line` high.
 pub(super) fn paragraph(canvas: &mut Canvas, area: [f32; 4], line: f32, color: Color, rng: &mut Rng) {
     let [x, y, w, h] = area;
     let rows = (h / line) as usize;
@@ -51,8 +51,8 @@ pub(super) fn paragraph(canvas: &mut Canvas, area: [f32; 4], line: f32, color: C
     }
 }
 
-/// A picture within an area: mosaic, landscape, chart, rings or a network.
-pub(super) fn picture(canvas: &mut Canvas, area: [f32; 4], rng: &mut Rng) {
+/// Draws an illustration within an area: mosaic, landscape, chart, rings or a network.
+pub(super) fn illustration(canvas: &mut Canvas, area: [f32; 4], rng: &mut Rng) {
     let [x, y, w, h] = area;
     let seed = rng.bits();
     let (a, b, c) = (ink(rng), ink(rng), ink(rng));
@@ -129,17 +129,17 @@ pub(super) fn poster(canvas: &mut Canvas, rng: &mut Rng) {
         let x = 0.04 * w + c as f32 * column;
         let inner = column - 0.04 * w;
         let mut y = top + 0.03 * h;
-        let mut with_picture = c % 2 == 0;
+        let mut with_illustration = c % 2 == 0;
         while y < 0.9 * h {
             let height = rng.range(0.16, 0.30) * h;
             let height = height.min(0.97 * h - y);
-            if with_picture {
-                picture(canvas, [x, y, inner, height], rng);
+            if with_illustration {
+                illustration(canvas, [x, y, inner, height], rng);
             } else {
                 canvas.rect(x, y, inner * 0.6, 0.018 * h, head);
                 paragraph(canvas, [x, y + 0.03 * h, inner, height - 0.03 * h], 0.016 * h, text, rng);
             }
-            with_picture = !with_picture;
+            with_illustration = !with_illustration;
             y += height + 0.03 * h;
         }
     }
@@ -158,7 +158,7 @@ pub(super) fn paper(canvas: &mut Canvas, m: f32, rng: &mut Rng) {
     canvas.rect(margin, margin, 0.5 * w, 0.010 / m, BLACK);
     let line = 0.009 / m;
     paragraph(canvas, [margin, margin + 0.025 / m, w - 2.0 * margin, h * 0.45], line, tint(BLACK, 2.2), rng);
-    picture(canvas, [margin, 0.64 * h, w - 2.0 * margin, 0.27 * h], rng);
+    illustration(canvas, [margin, 0.64 * h, w - 2.0 * margin, 0.27 * h], rng);
 }
 
 pub(super) fn cover(canvas: &mut Canvas, color: Color, rng: &mut Rng) {
@@ -166,7 +166,7 @@ pub(super) fn cover(canvas: &mut Canvas, color: Color, rng: &mut Rng) {
     canvas.fill(color);
     word(canvas, 0.1 * w, 0.1 * h, 0.8 * w, WHITE, rng);
     word(canvas, 0.1 * w, 0.3 * h, 0.5 * w, tint(WHITE, 0.8), rng);
-    picture(canvas, [0.15 * w, 0.45 * h, 0.7 * w, 0.42 * h], rng);
+    illustration(canvas, [0.15 * w, 0.45 * h, 0.7 * w, 0.42 * h], rng);
 }
 
 pub(super) fn spine(canvas: &mut Canvas, color: Color, rng: &mut Rng) {
@@ -217,7 +217,7 @@ pub(super) fn screen(canvas: &mut Canvas, rng: &mut Rng) {
         canvas.rect(x, y, ww, 0.05 * h, tint(ink(rng), 0.8));
         let line = 0.025 * h;
         paragraph(canvas, [x + 0.02 * w, y + 0.08 * h, ww * 0.9, wh * 0.5], line, text, rng);
-        picture(canvas, [x + 0.02 * w, y + 0.1 * h + wh * 0.5, ww * 0.6, wh * 0.3], rng);
+        illustration(canvas, [x + 0.02 * w, y + 0.1 * h + wh * 0.5, ww * 0.6, wh * 0.3], rng);
     }
     canvas.rect(0.0, 0.95 * h, w, 0.05 * h, [0.16, 0.17, 0.2]);
     for icon in 0..7 {

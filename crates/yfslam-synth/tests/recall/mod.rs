@@ -1,7 +1,6 @@
-//! How well the official detector finds synthetic people. In: worlds. Out: counts of visible people and of found ones, per
-//! circumstance. A person counts if the box of the visible pixels is taller than 30 % of the picture, and is found if a
-//! detection of class `person` with a score of at least 0.3 overlaps that box with an IoU of at least 0.5; each detection
-//! finds one person.
+//! Measures how many synthetic people the official detector finds. In: worlds. Out: the numbers of visible and of found people, per
+//! condition. A person counts if the box of the visible pixels is taller than 30 % of the image, and is found if a detection of
+//! class `person` with a score of at least 0.3 overlaps that box with an IoU of at least 0.5; each detection finds one person.
 #![allow(dead_code, clippy::unwrap_used, reason = "shared by a test and an example, of which each uses a part")]
 
 use std::collections::BTreeMap;
@@ -11,12 +10,12 @@ use yfslam::{BoundingBox, Detection, Detector};
 use yfslam_detect::{DetectorConfig, YoloFastestV2};
 use yfslam_synth::{SynthFrame, World};
 
-/// Least height of a person, relative to the picture.
+/// Least height of a person, relative to the image.
 pub const TALL: f32 = 0.3;
 /// Least overlap.
 pub const IOU: f32 = 0.5;
 
-/// The official model if the data folder has it.
+/// Returns the official model if the data folder has it.
 pub fn official_detector() -> Option<YoloFastestV2> {
     let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let data = std::env::var_os("YFSLAM_DATA").map_or(beside, PathBuf::from);
@@ -26,7 +25,7 @@ pub fn official_detector() -> Option<YoloFastestV2> {
 
 /// A visible person and the overlap of the detection that found it.
 #[derive(Clone, Copy, Debug)]
-pub struct Sighting {
+pub struct VisiblePerson {
     pub instance: u8,
     pub bbox: BoundingBox,
     /// Distance of the nearest visible pixel, m.
@@ -36,8 +35,8 @@ pub struct Sighting {
     pub found: bool,
 }
 
-impl Sighting {
-    /// Under which circumstances the person is seen; one of distance, one of truncation.
+impl VisiblePerson {
+    /// Returns the conditions of the person: one of distance, one of truncation.
     pub fn circumstances(&self, width: f32, height: f32) -> [&'static str; 2] {
         let b = &self.bbox;
         let distance = match self.nearest_m {
@@ -57,8 +56,8 @@ impl Sighting {
     }
 }
 
-/// Everyone tall enough in `shot`, with whether `detections` find them.
-pub fn sightings(shot: &SynthFrame, detections: &[Detection]) -> Vec<Sighting> {
+/// Returns all people in `shot` who are tall enough, and whether `detections` find them.
+pub fn visible_people(shot: &SynthFrame, detections: &[Detection]) -> Vec<VisiblePerson> {
     let height = shot.instances.height() as f32;
     let mut pairs = Vec::new();
     let people: Vec<(u8, BoundingBox)> = shot
@@ -83,16 +82,16 @@ pub fn sightings(shot: &SynthFrame, detections: &[Detection]) -> Vec<Sighting> {
         }
     }
     let pixels = || shot.instances.data().iter().zip(shot.exact_depth.data());
-    let sighting = |(&(instance, bbox), found): (&(u8, BoundingBox), bool)| {
+    let visible_person = |(&(instance, bbox), found): (&(u8, BoundingBox), bool)| {
         let own = || pixels().filter(|(k, _)| **k == instance);
         let nearest_m = own().map(|(_, z)| *z).fold(f32::INFINITY, f32::min);
         let filled = own().count() as f32 / bbox.area();
-        Sighting { instance, bbox, nearest_m, filled, found }
+        VisiblePerson { instance, bbox, nearest_m, filled, found }
     };
-    people.iter().zip(found).map(sighting).collect()
+    people.iter().zip(found).map(visible_person).collect()
 }
 
-/// People seen and people found.
+/// Numbers of visible people and of found ones.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Count {
     pub seen: usize,
@@ -106,29 +105,29 @@ impl Count {
         self.found += usize::from(found);
     }
 
-    /// Share found; 1 if there was nobody.
+    /// Returns the share that was found; 1 without people.
     pub fn recall(&self) -> f64 {
         if self.seen == 0 { 1.0 } else { self.found as f64 / self.seen as f64 }
     }
 }
 
-/// Counts per world and per circumstance.
+/// Counts per world and per condition.
 pub type Table = BTreeMap<String, Count>;
 
-/// Adds the sightings of every `step`-th frame to `table`; `each` sees every frame.
+/// Adds the visible people of every `step`-th frame to `table`; `each` is called for every frame.
 pub fn measure(
     world: &World,
     name: &str,
     step: usize,
     detector: &mut YoloFastestV2,
     table: &mut Table,
-    mut each: impl FnMut(usize, &SynthFrame, &[Detection], &[Sighting]),
+    mut each: impl FnMut(usize, &SynthFrame, &[Detection], &[VisiblePerson]),
 ) {
     let mut detections = Vec::new();
     for index in (0..world.len()).step_by(step) {
         let shot = world.frame(index);
         detector.detect(&shot.frame.color, &mut detections).unwrap();
-        let seen = sightings(&shot, &detections);
+        let seen = visible_people(&shot, &detections);
         for s in &seen {
             let [distance, cut] = s.circumstances(shot.instances.width() as f32, shot.instances.height() as f32);
             for key in [name, "all", distance, cut] {

@@ -16,7 +16,7 @@ fn write(path: &Path, resolution_m: f64, voxels: &[OctreeVoxel], format: OctreeF
     write_octomap(path, resolution_m, blocks, within, format)
 }
 
-/// Reads `.ot` data back into voxels of the finest level, colours too if there are any; leaves higher up are counted only.
+/// Reads the voxels of the finest level from `.ot` data, with colours if there are any; leaves of higher levels are only counted.
 fn read(colors: bool, data: &mut &[u8], key: [u32; 3], level: u32, out: &mut Vec<OctreeVoxel>, leaves: &mut usize) {
     let (log_odds, rest) = data.split_first_chunk::<4>().unwrap();
     let (color, rest) = if colors { rest.split_first_chunk::<3>().unwrap() } else { (&[0; 3], rest) };
@@ -38,7 +38,7 @@ fn read(colors: bool, data: &mut &[u8], key: [u32; 3], level: u32, out: &mut Vec
 }
 
 #[test]
-fn voxels_come_back_from_the_tree_where_they_were() {
+fn voxels_are_read_from_the_tree_at_their_places() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.ot");
     for (format, id) in [(OctreeFormat::LogOdds, "id OcTree\n"), (OctreeFormat::Colors, "id ColorOcTree\n")] {
@@ -67,7 +67,7 @@ fn voxels_come_back_from_the_tree_where_they_were() {
 }
 
 #[test]
-fn eight_alike_become_one_only_if_their_colours_are_alike_too() {
+fn eight_equal_leaves_become_one_only_if_their_colours_are_equal_too() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.ot");
     let mut voxels = cube(2, 2.0);
@@ -78,10 +78,10 @@ fn eight_alike_become_one_only_if_their_colours_are_alike_too() {
 }
 
 #[test]
-fn eight_alike_become_one_and_a_binary_tree_has_two_bytes_for_each_inner_node() {
+fn eight_equal_leaves_become_one_and_a_binary_tree_has_two_bytes_for_each_inner_node() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.bt");
-    // A cube of four is one leaf two levels up: below the root a chain of 13 inner nodes.
+    // A cube of four voxels becomes one leaf two levels up: below the root is a chain of 13 inner nodes.
     let size = write(&path, 0.1, &cube(4, 2.0), OctreeFormat::Binary).unwrap();
     assert_eq!(size, OctreeSize { nodes: 15, leaves: 1 });
     let text = std::fs::read(&path).unwrap();
@@ -91,15 +91,15 @@ fn eight_alike_become_one_and_a_binary_tree_has_two_bytes_for_each_inner_node() 
 }
 
 #[test]
-fn blocks_that_are_alike_become_one_too() {
+fn equal_blocks_become_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.bt");
-    // Eight blocks are one leaf four levels up: below the root a chain of 11 inner nodes.
+    // Eight blocks become one leaf four levels up: below the root is a chain of 11 inner nodes.
     assert_eq!(write(&path, 0.1, &cube(16, 2.0), OctreeFormat::Binary).unwrap(), OctreeSize { nodes: 13, leaves: 1 });
     let mut voxels = cube(16, 2.0);
     voxels[0].log_odds = -1.0;
     let size = write(&path, 0.1, &voxels, OctreeFormat::Binary).unwrap();
-    // From the leaf of before down to one voxel: eight leaves at each level but seven above the last.
+    // From the former leaf down to one voxel: eight leaves at the last level and seven at each level above.
     assert_eq!(size.leaves, 3 * 7 + 8);
     let header = format!("# Octomap OcTree binary file\n#\nid OcTree\nsize {}\nres 0.1\ndata\n", size.nodes);
     assert_eq!(std::fs::read(&path).unwrap().len(), header.len() + 2 * (size.nodes - size.leaves));

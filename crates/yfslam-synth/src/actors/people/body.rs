@@ -1,4 +1,4 @@
-//! A person's surface: textured parts, each fixed to a bone.
+//! The surface of a person: textured parts, each fixed to a bone.
 //!
 //! In: proportions, colours and a seed. Out: a mesh in bone coordinates with the bone of every vertex.
 
@@ -31,7 +31,7 @@ const TROUSERS: [[f32; 3]; 5] =
 const PATTERNS: [Pattern; 6] =
     [Pattern::Jacket, Pattern::Buttons, Pattern::Stripes, Pattern::Checks, Pattern::Print, Pattern::Motifs];
 
-/// Rays per vertex for the light that a body keeps from itself, and how far they reach, m.
+/// Rays per vertex for the light that a body hides from itself, and their length, m.
 const SELF_SHADE: (usize, f32) = (12, 0.40);
 
 /// Limb (trunk, head, arms, legs) of each bone.
@@ -49,7 +49,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// Person number `instance` (from 1); textures are ordered from `palette`.
+    /// Creates person number `instance` (from 1); textures are ordered from `palette`.
     pub fn new(instance: u8, palette: &mut Palette, seed: u64) -> Self {
         let style = Rng::new(seed, 0x57).below(36);
         let mut rng = Rng::new(seed, 0xb0d1 + u64::from(instance));
@@ -61,8 +61,8 @@ impl Body {
         body
     }
 
-    /// Darkens what other limbs hide from light in a relaxed stand: armpits, below the chin, between the legs. A limb does
-    /// not shade itself: its joints bend.
+    /// Darkens what other limbs hide from light in a relaxed stand: armpits, below the chin, between the legs. A limb does not
+    /// darken itself, because its joints bend.
     fn shade_itself(&mut self) {
         let joints = super::gait::stand(0, 0.0);
         let poses = skeleton::forward_kinematics(&Isometry3::identity(), &self.proportions, &joints);
@@ -101,7 +101,7 @@ impl Body {
     }
 }
 
-/// Puts parts on bones.
+/// Builder that adds parts to bones.
 pub struct Tailor<'a> {
     mesh: Mesh,
     bones: Vec<u8>,
@@ -109,18 +109,18 @@ pub struct Tailor<'a> {
     /// Draws for variety.
     pub rng: Rng,
     instance: u8,
-    /// Shifts the choice of shirts, by the seed.
+    /// Offset of the choice of shirts, by the seed.
     style: usize,
 }
 
 impl Tailor<'_> {
-    /// A patch of the material.
+    /// Creates a patch of the material.
     pub fn patch(&mut self, material: Material, size_m: [f32; 2], density: f32) -> Patch {
         let texture = self.palette.order(material, size_m, density * material.detail(), self.rng.bits());
         Patch { texture, lighting: Lighting::Vertex, instance: self.instance }
     }
 
-    /// A loft on `bone`, moved by `at` and tilted by `pitch` about the bone's x axis.
+    /// Adds a loft on `bone`, moved by `at` and tilted by `pitch` about the x axis of the bone.
     pub fn part(&mut self, bone: Bone, at: Vec3, pitch: f32, rings: &[[f32; 3]], patch: Patch) {
         let first = self.mesh.vertices.len();
         self.mesh.loft(16, rings, patch);
@@ -129,7 +129,7 @@ impl Tailor<'_> {
         self.bones.resize(self.mesh.vertices.len(), bone.index() as u8);
     }
 
-    /// A closed surface on `bone`.
+    /// Adds a closed surface on `bone`.
     pub fn sculpture(&mut self, bone: Bone, nu: u32, nv: u32, patch: Patch, surface: impl Fn(f32, f32) -> Vec3) {
         self.mesh.sculpture(nu, nv, patch, surface);
         self.bones.resize(self.mesh.vertices.len(), bone.index() as u8);
@@ -137,7 +137,7 @@ impl Tailor<'_> {
 
     fn dress(&mut self, p: &Proportions) {
         let (skin, hair) = (self.rng.pick(SKINS), self.rng.pick(HAIRS));
-        // The number chooses the shirt, so that people in one picture differ.
+        // The number chooses the shirt, so that people in one image differ.
         let [shirt, accent] = SHIRTS[(usize::from(self.instance) + self.style) % SHIRTS.len()];
         let pattern = PATTERNS[(usize::from(self.instance) + self.style) % PATTERNS.len()];
         let trousers = self.rng.pick(TROUSERS);
@@ -236,7 +236,7 @@ impl Tailor<'_> {
         self.part(Bone::Shank(side), Vec3::zeros(), 0.0, &smooth(&calf), patch);
         let leather = self.rng.range(0.14, 0.5);
         let patch = self.patch(Material::Plain([leather, 0.9 * leather, 0.8 * leather]), [0.3, 0.28], 500.0);
-        // The shoe's axis lies forward: the loft is tilted by a quarter turn.
+        // The axis of the shoe points forward: the loft is tilted by a quarter turn.
         let a = p.ankle();
         let shoe = [
             [0.090 * s, 0.0, 0.0],
@@ -252,7 +252,7 @@ impl Tailor<'_> {
     }
 }
 
-/// Rings of an ellipsoid.
+/// Returns the rings of an ellipsoid.
 pub fn ellipsoid([rx, ry, rz]: [f32; 3]) -> Vec<[f32; 3]> {
     (0..=8)
         .map(|i| {
@@ -263,7 +263,7 @@ pub fn ellipsoid([rx, ry, rz]: [f32; 3]) -> Vec<[f32; 3]> {
         .collect()
 }
 
-/// Rings of a tapered capsule that hangs down from `z` by `length`.
+/// Returns the rings of a tapered capsule that extends downward from `z` by `length`.
 fn limb(z: f32, top: f32, bottom: f32, length: f32) -> Vec<[f32; 3]> {
     let ring = |height: f32, radius: f32| [height, radius, radius];
     vec![
@@ -279,7 +279,7 @@ fn limb(z: f32, top: f32, bottom: f32, length: f32) -> Vec<[f32; 3]> {
     ]
 }
 
-/// Doubles the number of rings with a Catmull–Rom curve, so that few figures give a round shape.
+/// Doubles the number of rings with a Catmull–Rom curve, so that few values give a round shape.
 fn smooth(rings: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let at = |i: isize| rings[i.clamp(0, rings.len() as isize - 1) as usize];
     let mut out = Vec::with_capacity(2 * rings.len());

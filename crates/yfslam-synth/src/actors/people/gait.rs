@@ -1,7 +1,7 @@
 //! Movements: a walking cycle, and sitting or standing with small gestures.
 //!
-//! In: how far and how fast someone walks, or the time. Out: joint angles. Walking is built from the feet: each carries for
-//! 60 % of the cycle, rolls over its ball and swings forward (phases as in Winter, "Biomechanics and Motor Control of Human
+//! In: the distance and speed of a walker, or the time. Out: joint angles. Walking is built from the feet: each carries the weight
+//! for 60 % of the cycle, rolls over its ball and swings forward (phases as in Winter, "Biomechanics and Motor Control of Human
 //! Movement", chapter 2); the law of cosines gives hip and knee.
 
 use std::f32::consts::TAU;
@@ -10,29 +10,29 @@ use super::skeleton::{Joints, Proportions};
 use super::smooth;
 use crate::rng::Rng;
 
-/// Speed from which on people stride out in full, m/s; slower, they are about to stop.
+/// Speed above which strides have their full length, m/s; slower walkers are about to stop.
 const FULL_STRIDE_SPEED: f32 = 0.7;
 /// Length of a stride (two steps) relative to the leg.
 const STRIDE: f32 = 1.5;
-/// Share of the cycle that a foot carries.
+/// Share of the cycle in which a foot carries the weight.
 const STANCE: f32 = 0.6;
-/// Where the foot is put down, ahead of the hips, as a share of the stride.
+/// Place of the foot when it is put down, ahead of the hips, as a share of the stride.
 const AHEAD: f32 = 0.255;
-/// Hips above the ankle of a foot that stands flat, relative to the leg.
+/// Height of the hips above the ankle of a foot that stands flat, relative to the leg.
 const HIPS: f32 = 0.93;
-/// From the ankle to the ball of the foot, and how far the heel rises about it, m and rad.
+/// Distance from the ankle to the ball of the foot, m, and the rotation of the heel about it, rad.
 const BALL_M: f32 = 0.14;
 const HEEL_RISE: f32 = 0.75;
-/// How high a foot is lifted while it swings, m.
+/// Height to which a foot is lifted while it swings, m.
 const LIFT_M: f32 = 0.05;
 
-/// Length of a full stride (two steps), m.
+/// Returns the length of a full stride (two steps), m.
 pub fn stride(p: &Proportions) -> f32 {
     STRIDE * (p.thigh() + p.shank())
 }
 
-/// Joints of someone who has walked `distance` metres and moves at `speed` m/s; who halts, gestures. A foot that carries
-/// stays where it is on the way; the angles of its leg follow.
+/// Returns the joints of a person who has walked `distance` metres and moves at `speed` m/s; a halted person gestures. A foot that
+/// carries the weight stays in place; the angles of its leg follow.
 pub fn walk(p: &Proportions, distance: f32, speed: f32, seed: u64, time: f32) -> Joints {
     let effort = smooth(speed / FULL_STRIDE_SPEED);
     let cycle = (distance / stride(p)).fract();
@@ -69,7 +69,7 @@ struct Foot {
     pitch: f32,
 }
 
-/// The foot at share `at` of the cycle that begins when it is put down.
+/// Returns the foot at share `at` of the cycle that begins when it is put down.
 fn foot(p: &Proportions, at: f32) -> Foot {
     let stride = stride(p);
     // Turning about the ball moves the ankle up and forward.
@@ -91,7 +91,7 @@ fn foot(p: &Proportions, at: f32) -> Foot {
     Foot { forward: stride * swing + forward, up: up + lift, pitch: -heel }
 }
 
-/// Angles of hip and knee that bring the ankle `forward` of the hip and `down` from it.
+/// Returns the angles of hip and knee that bring the ankle `forward` of the hip and `down` from it.
 fn bend(p: &Proportions, forward: f32, down: f32) -> (f32, f32) {
     let (thigh, shank) = (p.thigh(), p.shank());
     let reach = forward.hypot(down).clamp(0.3 * (thigh + shank), 0.999 * (thigh + shank));
@@ -100,7 +100,7 @@ fn bend(p: &Proportions, forward: f32, down: f32) -> (f32, f32) {
     (forward.atan2(down) + above, std::f32::consts::PI - inside)
 }
 
-/// Slow, smooth, seeded sway in [-1, 1] or so; `channel` tells joints apart.
+/// Returns a slow, smooth, seeded sway of about [-1, 1]; `channel` distinguishes the joints.
 fn sway(seed: u64, channel: u64, time: f32, hertz: f32) -> f32 {
     let mut rng = Rng::new(seed, channel);
     let (a, b) = (rng.range(0.0, TAU), rng.range(0.0, TAU));
@@ -108,7 +108,7 @@ fn sway(seed: u64, channel: u64, time: f32, hertz: f32) -> f32 {
     0.7 * (TAU * f * time + a).sin() + 0.3 * (TAU * g * time + b).sin()
 }
 
-/// Adds breathing, glances and gestures that come and go; `lively` 1 is a conversation.
+/// Adds breathing, glances and gestures that come and go; with `lively` 1 they are those of a conversation.
 fn gestures(j: &mut Joints, seed: u64, time: f32, lively: f32) {
     let s = |channel, hertz| sway(seed, channel, time, hertz);
     j.head[0] += 0.06 + 0.08 * lively * s(1, 0.21);
@@ -117,7 +117,7 @@ fn gestures(j: &mut Joints, seed: u64, time: f32, lively: f32) {
     j.trunk[1] += 0.10 * lively * s(5, 0.07);
     for side in [0, 1] {
         let channel = 10 * (side as u64 + 1);
-        // Talking hands: active about half of the time.
+        // Hands of a speaking person: active about half of the time.
         let active = lively * (2.0 * s(channel, 0.06)).clamp(0.0, 1.0);
         j.shoulder[side] += active * (0.28 + 0.16 * s(channel + 1, 0.55));
         j.elbow[side] += active * (0.50 + 0.42 * s(channel + 2, 0.75));
@@ -125,7 +125,7 @@ fn gestures(j: &mut Joints, seed: u64, time: f32, lively: f32) {
     }
 }
 
-/// Joints of someone who stands.
+/// Returns the joints of a standing person.
 pub fn stand(seed: u64, time: f32) -> Joints {
     let mut j =
         Joints { shoulder: [0.05; 2], elbow: [0.25; 2], lift: [0.10; 2], spread: [0.06; 2], ..Joints::default() };
@@ -136,7 +136,7 @@ pub fn stand(seed: u64, time: f32) -> Joints {
     j
 }
 
-/// Joints of someone who bends down to the floor (1) with straight legs at 0; the feet stay below the hips.
+/// Bends a person down to the floor (1) with straight legs at 0; the feet stay below the hips.
 pub fn stoop(j: &mut Joints, depth: f32) {
     const LEGS: f32 = 0.95;
     for side in [0, 1] {
@@ -149,7 +149,7 @@ pub fn stoop(j: &mut Joints, depth: f32) {
     j.head[0] += 0.3 * depth;
 }
 
-/// Joints of someone who sits with the hip joints `height` metres above the floor, shanks upright, soles on the floor.
+/// Returns the joints of a person who sits with the hip joints `height` metres above the floor, shanks upright, soles on the floor.
 pub fn sit(p: &Proportions, height: f32, seed: u64, time: f32) -> Joints {
     let bend = ((height - p.shank() - p.ankle()) / p.thigh()).clamp(-0.3, 0.9).acos();
     let mut j = Joints {

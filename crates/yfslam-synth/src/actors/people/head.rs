@@ -1,4 +1,4 @@
-//! The head: skull, face, nose, ears and hair, in the head bone's axes (origin at the top of the neck).
+//! The head: skull, face, nose, ears and hair, in the axes of the head bone (origin at the top of the neck).
 
 use super::body::{Tailor, ellipsoid};
 use super::skeleton::Bone;
@@ -9,7 +9,7 @@ use crate::texture::material::Material;
 /// Middle of the skull.
 const MIDDLE: [f32; 3] = [0.0, 0.016, 0.128];
 
-/// How hair falls.
+/// Shape of the hair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cut {
     Short,
@@ -17,11 +17,11 @@ pub enum Cut {
     Long,
 }
 
-/// Surface of skull and face around their middle: u once around from the right ear over the face, v from crown to chin.
+/// Returns the surface of skull and face around their middle: u once around from the right ear over the face, v from crown to chin.
 fn skull(u: f32, v: f32) -> Vec3 {
     let (sin, cos) = (u * std::f32::consts::TAU).sin_cos();
     let (ring, height) = (v * std::f32::consts::PI).sin_cos();
-    // Nothing tapers above the eyes; the jaw is narrower, and less deep at the back.
+    // No taper above the eyes; the jaw is narrower, and less deep at the back.
     let below = (-height).max(0.0);
     let wide = 0.077 * (1.0 - 0.30 * below * below);
     let deep = if sin > 0.0 { 0.094 * (1.0 - 0.06 * below) } else { 0.100 * (1.0 - 0.45 * below) };
@@ -32,7 +32,7 @@ fn skull(u: f32, v: f32) -> Vec3 {
 }
 
 impl Tailor<'_> {
-    /// Puts neck, head and hair on; `s` is the size relative to an average body.
+    /// Adds neck, head and hair; `s` is the size relative to an average body.
     pub fn head(&mut self, s: f32, skin: [f32; 3], hair: [f32; 3]) {
         let cut = self.rng.pick([Cut::Short, Cut::Short, Cut::Full, Cut::Long]);
         let beard = cut != Cut::Long && self.rng.chance(0.3);
@@ -65,14 +65,14 @@ impl Tailor<'_> {
     }
 }
 
-/// Surface of the hair: over the skull from the crown to the hairline, and down the back if it is long.
+/// Returns the surface of the hair: over the skull from the crown to the hairline, and down the back if it is long.
 fn strand(cut: Cut, u: f32, v: f32) -> Vec3 {
     let aside = (u - 0.25).abs();
     let side = aside.min(1.0 - aside);
     let long = cut == Cut::Long;
     let line = hairline(side) + if long { 0.30 * ((side - 0.15) / 0.1).clamp(0.0, 1.0) } else { 0.0 };
     let thick = if cut == Cut::Short { 0.07 } else { 0.16 };
-    // Thins out towards the hairline, and goes below the skin at its end.
+    // It becomes thinner towards the hairline and goes below the skin at its end.
     let edge = if long && side > 0.2 { 0.3 * v } else { v };
     let on = skull(u, (v * line).min(0.62));
     let drop = (v * line - 0.62).max(0.0);

@@ -1,6 +1,6 @@
-//! People: who they are and how they move.
+//! People: their bodies and their movements.
 //!
-//! In: a body and a plan. Out: at any time, the posed skeleton and where the things are that someone pushes or carries.
+//! In: a body and a plan. Out: at any time, the posed skeleton and the place of the object that the person pushes or carries.
 
 pub mod body;
 pub mod gait;
@@ -10,7 +10,7 @@ pub mod tasks;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
-use super::rounds::Way;
+use super::routes::Route;
 use crate::light::Occluder;
 use crate::mesh::Vec3;
 use crate::rng::{Rng, hash};
@@ -19,14 +19,14 @@ use body::Body;
 use skeleton::{Bone, BonePoses, Joints};
 use tasks::Task;
 
-/// What one person does.
+/// The activity of one person.
 #[derive(Clone, Debug)]
 pub enum Plan {
-    /// Walks a round, perhaps with something to do on the way.
-    Walk(Way, Task),
+    /// Walks along a route, possibly with a task.
+    Walk(Route, Task),
     /// Sits and gestures.
     Sit(Seat),
-    /// Sits down and gets up again and again.
+    /// Repeatedly sits down and gets up.
     SitAndRise(Seat),
     /// Stands and gestures.
     Stand(Seat),
@@ -37,46 +37,46 @@ pub enum Plan {
 pub struct Person {
     /// The body.
     pub body: Body,
-    /// What it does.
+    /// The activity.
     pub plan: Plan,
     seed: u64,
 }
 
-/// Hip joints above the seat, m.
+/// Height of the hip joints above the seat, m.
 const HIPS_ABOVE_SEAT_M: f32 = 0.09;
 
-/// A pose upright on the floor.
+/// Returns an upright pose on the floor.
 pub fn upright(position: [f32; 2], z: f32, heading: f32) -> Isometry3<f32> {
     let turn = UnitQuaternion::from_axis_angle(&Vec3::z_axis(), heading);
     Isometry3::from_parts(Translation3::new(position[0], position[1], z), turn)
 }
 
-/// Smooth step from 0 at `t` = 0 to 1 at `t` = 1.
+/// Returns a smooth step from 0 at `t` = 0 to 1 at `t` = 1.
 pub fn smooth(t: f32) -> f32 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
 impl Person {
-    /// Person number `k` (from 0) of a world with the given seed.
+    /// Creates person number `k` (from 0) of a world with the given seed.
     pub fn new(body: Body, plan: Plan, seed: u64, k: usize) -> Self {
         Self { body, plan, seed: hash(seed, 100 + k as u64) }
     }
 
-    /// Poses of the bones at `time` seconds.
+    /// Returns the poses of the bones at `time` seconds.
     pub fn poses(&self, time: f64) -> BonePoses {
         let p = &self.body.proportions;
         let (seed, t) = (self.seed, time as f32);
         match &self.plan {
-            Plan::Walk(way, task) => {
-                let step = way.at(time);
+            Plan::Walk(route, task) => {
+                let step = route.at(time);
                 let mut joints = gait::walk(p, step.distance as f32, step.speed as f32, seed, t);
-                let turn = task.prepare(way, &step, &mut joints);
+                let turn = task.prepare(route, &step, &mut joints);
                 let position = step.position.map(|v| v as f32);
                 let heading = step.heading as f32 + turn.unwrap_or(step.glance as f32);
                 let root = upright(position, self.height_on_floor(&joints), heading);
                 let mut poses = skeleton::forward_kinematics(&root, p, &joints);
-                task.hands(way, &step, p, &mut poses);
+                task.hands(route, &step, p, &mut poses);
                 poses
             }
             Plan::Sit(seat) => self.seated(seat, 0.0, t),
@@ -89,14 +89,14 @@ impl Person {
         }
     }
 
-    /// Between sitting (0) and standing (1) in front of the seat. The feet stay where they are.
+    /// Returns the poses between sitting (0) and standing (1) in front of the seat. The feet stay in place.
     fn seated(&self, seat: &Seat, risen: f32, time: f32) -> BonePoses {
         let p = &self.body.proportions;
         let hips = seat.position.z + HIPS_ABOVE_SEAT_M;
         let sitting = gait::sit(p, hips, self.seed, time);
         let standing = gait::stand(self.seed, time);
         let mut joints = sitting.blend(&standing, risen);
-        // To get up, one leans over one's feet.
+        // To get up, a person leans over the feet.
         joints.trunk[0] += 0.75 * (std::f32::consts::PI * risen).sin();
         let ankle = |j: &Joints| {
             let poses = skeleton::forward_kinematics(&Isometry3::identity(), p, j);
@@ -109,13 +109,13 @@ impl Person {
         skeleton::forward_kinematics(&root, p, &joints)
     }
 
-    /// Height of the hips at which the lower foot touches the floor.
+    /// Returns the height of the hips at which the lower foot touches the floor.
     fn height_on_floor(&self, joints: &Joints) -> f32 {
         let p = &self.body.proportions;
         -skeleton::lowest_sole(&skeleton::forward_kinematics(&Isometry3::identity(), p, joints), p)
     }
 
-    /// Spheres in the trunk, the legs and the feet.
+    /// Returns spheres in the trunk, the legs and the feet.
     pub fn occluders(&self, poses: &BonePoses) -> Vec<Occluder> {
         let sphere = |bone: Bone, z: f32, radius: f32| Occluder {
             center: (poses[bone.index()] * Point3::new(0.0, 0.0, z)).coords,
@@ -130,7 +130,8 @@ impl Person {
     }
 }
 
-/// How far someone has got up at `time`: sits for some seconds, takes 1.6 s to get up, stands, and takes 1.8 s to sit down.
+/// Returns how far a person has got up at `time`: the person sits for some seconds, takes 1.6 s to get up, stands, and takes 1.8 s
+/// to sit down.
 fn rising(seed: u64, time: f32) -> f32 {
     let mut rng = Rng::new(seed, 0x515);
     let (sits, stands, phase) = (rng.range(2.5, 4.5), rng.range(2.0, 4.0), rng.range(0.0, 1.0));

@@ -1,8 +1,8 @@
-//! The skeleton: bones, their lengths, and where each is for given joint angles.
+//! The skeleton: bones, their lengths, and the pose of each for given joint angles.
 //!
-//! In: proportions and joint angles. Out: one pose per bone in the world. A person's own axes are right (+x), forward (+y)
-//! and up (+z). Segment lengths as shares of body height follow Drillis and Contini, "Body segment parameters" (1966), as
-//! in Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1.
+//! In: proportions and joint angles. Out: one pose per bone in the world. The axes of a person are right (+x), forward (+y) and up
+//! (+z). Segment lengths as shares of body height follow Drillis and Contini, "Body segment parameters" (1966), as in Winter,
+//! "Biomechanics and Motor Control of Human Movement", figure 4.1.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
 
@@ -25,7 +25,7 @@ pub enum Bone {
 pub const BONES: usize = 13;
 
 impl Bone {
-    /// Position in a [`BonePoses`].
+    /// Returns the index in a [`BonePoses`].
     pub fn index(self) -> usize {
         match self {
             Self::Pelvis => 0,
@@ -40,7 +40,7 @@ impl Bone {
     }
 }
 
-/// World (or root) from bone, by [`Bone::index`]. Limb bones start at their joint and hang along −z.
+/// World (or root) from bone, by [`Bone::index`]. Limb bones start at their joint and extend along −z.
 pub type BonePoses = [Isometry3<f32>; BONES];
 
 /// Lengths of a body, m.
@@ -53,7 +53,7 @@ pub struct Proportions {
 }
 
 impl Joints {
-    /// Blend from `self` (0) to `other` (1), angle by angle.
+    /// Blends from `self` (0) to `other` (1), angle by angle.
     pub fn blend(&self, other: &Self, t: f32) -> Self {
         fn mix<const N: usize>(a: [f32; N], b: [f32; N], t: f32) -> [f32; N] {
             std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)
@@ -74,42 +74,42 @@ impl Joints {
 }
 
 impl Proportions {
-    /// Hip joint to knee.
+    /// Returns the distance from hip joint to knee.
     pub fn thigh(&self) -> f32 {
         0.245 * self.height
     }
 
-    /// Knee to ankle.
+    /// Returns the distance from knee to ankle.
     pub fn shank(&self) -> f32 {
         0.246 * self.height
     }
 
-    /// Ankle above the sole.
+    /// Returns the height of the ankle above the sole.
     pub fn ankle(&self) -> f32 {
         0.045 * self.height
     }
 
-    /// Hip joint to shoulder joint.
+    /// Returns the distance from hip joint to shoulder joint.
     pub fn trunk(&self) -> f32 {
         0.285 * self.height
     }
 
-    /// Shoulder to elbow.
+    /// Returns the distance from shoulder to elbow.
     pub fn upper_arm(&self) -> f32 {
         0.180 * self.height
     }
 
-    /// Elbow to wrist.
+    /// Returns the distance from elbow to wrist.
     pub fn forearm(&self) -> f32 {
         0.146 * self.height
     }
 
-    /// Half the distance between the shoulders.
+    /// Returns half the distance between the shoulders.
     pub fn half_shoulders(&self) -> f32 {
         0.093 * self.height * (0.6 + 0.4 * self.girth)
     }
 
-    /// Half the distance between the hip joints.
+    /// Returns half the distance between the hip joints.
     pub fn half_hips(&self) -> f32 {
         0.046 * self.height
     }
@@ -156,7 +156,7 @@ fn joint(x: f32, y: f32, z: f32, rotation: UnitQuaternion<f32>) -> Isometry3<f32
     Isometry3::from_parts(Translation3::new(x, y, z), rotation)
 }
 
-/// Bone poses with the middle of the hips at `root`.
+/// Returns the bone poses with the middle of the hips at `root`.
 pub fn forward_kinematics(root: &Isometry3<f32>, p: &Proportions, j: &Joints) -> BonePoses {
     let mut poses = [*root; BONES];
     let pelvis = root * joint(0.0, 0.0, 0.0, rot_z(j.pelvis[0]) * rot_y(j.pelvis[1]));
@@ -184,45 +184,45 @@ pub fn forward_kinematics(root: &Isometry3<f32>, p: &Proportions, j: &Joints) ->
     poses
 }
 
-/// Bends an arm so that its palm comes to `target` (a point of the world), or as near as the arm is long; the elbow points down
-/// and outwards. The circle of possible elbows is that of two spheres around shoulder and palm.
+/// Bends an arm so that its palm reaches `target` (a point of the world), or as near as the arm is long; the elbow points down and
+/// outward. The circle of possible elbows is that of two spheres around shoulder and palm.
 pub fn reach(poses: &mut BonePoses, p: &Proportions, side: usize, target: &Vec3) {
     let (upper, lower) = (p.upper_arm(), p.forearm() + PALM * p.height);
     let chest = poses[Bone::Chest.index()];
     let shoulder = poses[Bone::UpperArm(side).index()].translation.vector;
-    let outwards = chest.rotation * Vec3::x() * if side == 0 { 1.0 } else { -1.0 };
+    let outward = chest.rotation * Vec3::x() * if side == 0 { 1.0 } else { -1.0 };
     let to = target - shoulder;
     let distance = to.norm().clamp((upper - lower).abs() + 0.02, upper + lower - 0.003);
     let along = to.normalize();
     let share = (upper * upper - lower * lower + distance * distance) / (2.0 * distance);
     let aside = (upper * upper - share * share).max(0.0).sqrt();
-    let pole = outwards * 0.7 - Vec3::z();
+    let pole = outward * 0.7 - Vec3::z();
     let pole = (pole - along * pole.dot(&along)).normalize();
     let elbow = shoulder + along * share + pole * aside;
     let palm = shoulder + along * distance;
     let right = chest.rotation * Vec3::x();
-    poses[Bone::UpperArm(side).index()] = hanging(&shoulder, &elbow, &right);
-    poses[Bone::Forearm(side).index()] = hanging(&elbow, &palm, &right);
+    poses[Bone::UpperArm(side).index()] = bone_between(&shoulder, &elbow, &right);
+    poses[Bone::Forearm(side).index()] = bone_between(&elbow, &palm, &right);
 }
 
-/// Wrist to palm as a share of body height.
+/// Distance from wrist to palm as a share of body height.
 pub const PALM: f32 = 0.045;
 
-/// Where the palm of an arm is.
+/// Returns the place of the palm of an arm.
 pub fn palm(poses: &BonePoses, p: &Proportions, side: usize) -> Vec3 {
     let wrist = Point3::new(0.0, 0.0, -p.forearm() - PALM * p.height);
     (poses[Bone::Forearm(side).index()] * wrist).coords
 }
 
-/// Pose of a bone that starts at `from`, points to `to` and has its x axis about along `right`.
-fn hanging(from: &Vec3, to: &Vec3, right: &Vec3) -> Isometry3<f32> {
+/// Returns the pose of a bone that starts at `from`, points to `to` and has its x axis roughly along `right`.
+fn bone_between(from: &Vec3, to: &Vec3, right: &Vec3) -> Isometry3<f32> {
     let z = (from - to).normalize();
     let x = (right - z * right.dot(&z)).normalize();
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
     Isometry3::from_parts(Translation3::from(*from), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-/// Height of the lowest point of the soles (heel or ball) for poses computed with the root at height 0.
+/// Returns the height of the lowest point of the soles (heel or ball) for poses computed with the root at height 0.
 pub fn lowest_sole(poses: &BonePoses, p: &Proportions) -> f32 {
     let soles = [0, 1].into_iter().flat_map(|side| {
         let foot = poses[Bone::Foot(side).index()];
