@@ -7,8 +7,7 @@ mod common;
 
 use common::{Net, Size, Style};
 use criterion::{Criterion, criterion_group, criterion_main};
-use yfslam::Detector;
-use yfslam::image::RgbImage;
+use yfslam::{Detector, RgbImage};
 use yfslam_detect::{DetectorConfig, YoloFastestV2, available_levels};
 
 fn detector(bytes: &[u8]) -> YoloFastestV2 {

@@ -8,8 +8,7 @@ use std::error::Error;
 use std::path::Path;
 
 use rustix::time::{ClockId, clock_gettime};
-use yfslam::Detector;
-use yfslam::image::RgbImage;
+use yfslam::{Detector, RgbImage};
 use yfslam_detect::{DetectorConfig, YoloFastestV2, available_levels};
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -11,7 +11,7 @@
 //! use yfslam_detect::{DetectorConfig, YoloFastestV2};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let image = yfslam::image::RgbImage::new(640, 480);
+//! # let image = yfslam::RgbImage::new(640, 480);
 //! let mut detector = YoloFastestV2::load("model.onnx".as_ref(), &DetectorConfig::default())?; // or YoloFastestV2::embedded
 //! let mut detections = Vec::new();
 //! detector.detect(&image, &mut detections)?;

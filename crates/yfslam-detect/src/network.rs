@@ -1,7 +1,6 @@
 //! What the networks of this crate have in common beyond the core's `Detector`.
 
-use yfslam::Detector;
-use yfslam::image::Image;
+use yfslam::{Detector, Image};
 
 /// A detection network, which may also segment the objects.
 pub trait Network: Detector {

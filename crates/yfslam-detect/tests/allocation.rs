@@ -8,8 +8,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::{Net, Size, Style};
-use yfslam::Detector;
-use yfslam::image::RgbImage;
+use yfslam::{Detector, RgbImage};
 use yfslam_detect::{DetectorConfig, YoloFastestV2};
 
 static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);

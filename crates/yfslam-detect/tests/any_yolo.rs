@@ -5,8 +5,7 @@ mod common;
 
 use common::Net;
 use common::other::{BOXES, net, net_with_masks};
-use yfslam::image::RgbImage;
-use yfslam::{BoundingBox, Detection, Detector};
+use yfslam::{BoundingBox, Detection, Detector, RgbImage};
 use yfslam_detect::{AnyYolo, DetectorConfig, Network, load};
 
 #[test]

@@ -8,8 +8,7 @@ use std::sync::LazyLock;
 
 use common::{Attribute, Constant, Net, Size, Style, random};
 use proptest::prelude::*;
-use yfslam::image::RgbImage;
-use yfslam::{Detection, Detector};
+use yfslam::{Detection, Detector, RgbImage};
 use yfslam_detect::{DetectorConfig, YoloFastestV2};
 
 const SIZE: Size = Size { height: 32, width: 64, channels: 2, classes: 2 };

@@ -4,8 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use yfslam::image::RgbImage;
-use yfslam::{BoundingBox, Detection, Detector};
+use yfslam::{BoundingBox, Detection, Detector, RgbImage};
 use yfslam_detect::{DetectorConfig, YoloFastestV2, available_levels};
 
 #[derive(Deserialize)]

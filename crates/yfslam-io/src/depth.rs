@@ -5,9 +5,10 @@
 
 use std::ops::RangeInclusive;
 
-use yfslam::Camera;
+use yfslam::Image;
+
+use crate::camera::CameraSource;
 use yfslam::config::DepthSource;
-use yfslam::image::Image;
 
 use crate::error::{Error, Result};
 use crate::sequence::Sequence;
@@ -101,21 +102,24 @@ pub fn check_depth_factor<'a>(
 ///
 /// # Errors
 /// None of the first frames can be used, or the depth factor is implausible.
-pub fn check_recording(sequence: &Sequence, camera: &Camera) -> Result<Option<DepthStatistics>> {
+pub fn check_recording(sequence: &Sequence, camera: &CameraSource) -> Result<Option<DepthStatistics>> {
     let first = sequence.entries.iter().take(PROBE_ATTEMPTS).cloned().collect();
     let first = Sequence { entries: first, ..sequence.clone() };
-    let (mut depths, mut first_error) = (Vec::new(), None);
+    let (mut depths, mut usable, mut first_error) = (Vec::new(), 0, None);
     for frame in FrameStream::open(&first, camera, DEFAULT_LOOK_AHEAD)? {
         match frame {
-            Ok(frame) => depths.push(frame.depth),
+            Ok(frame) => {
+                usable += 1;
+                depths.extend(frame.depth);
+            }
             Err(error) => first_error = first_error.or(Some(error)),
         }
-        if depths.len() == PROBE_FRAMES {
+        if usable == PROBE_FRAMES {
             break;
         }
     }
     match first_error {
-        Some(error) if depths.is_empty() => {
+        Some(error) if usable == 0 => {
             let problem = format!("none of the first {} frames can be used", first.entries.len());
             Err(Error::content(&sequence.folder, problem, error.to_string()))
         }

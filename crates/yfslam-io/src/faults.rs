@@ -8,8 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use yfslam::RgbdFrame;
-use yfslam::image::{DepthImage, Image, RgbImage};
+use yfslam::{DepthImage, Frame, Image, RgbImage};
 
 use crate::error::{Error, Result};
 use crate::time::{format_stamp, parse_stamp_ns};
@@ -108,7 +107,7 @@ impl fmt::Display for Fault {
 #[derive(Clone, Debug)]
 pub struct Delivery {
     /// The frame, always with its true stamp.
-    pub frame: RgbdFrame,
+    pub frame: Frame,
     /// Whether the camera delivers the stamp.
     pub has_stamp: bool,
 }
@@ -118,7 +117,7 @@ pub struct Delivery {
 pub struct FaultInjector {
     faults: Vec<Fault>,
     first_ns: i64,
-    frozen: Option<RgbdFrame>,
+    frozen: Option<Frame>,
     held: Option<Delivery>,
     ready: VecDeque<Delivery>,
 }
@@ -130,7 +129,7 @@ impl FaultInjector {
     }
 
     /// Adds the next frame.
-    pub fn push(&mut self, mut frame: RgbdFrame) {
+    pub fn push(&mut self, mut frame: Frame) {
         let elapsed_ns = frame.timestamp_ns.saturating_sub(self.first_ns);
         let mut delivery = Some(true);
         let (mut twice, mut late, mut frozen) = (false, false, false);
@@ -143,7 +142,9 @@ impl FaultInjector {
                 FaultKind::Frozen => {
                     frozen = true;
                     let kept = self.frozen.get_or_insert_with(|| frame.clone());
-                    frame = RgbdFrame { timestamp_ns: frame.timestamp_ns, ..kept.clone() };
+                    let timestamp_ns = frame.timestamp_ns;
+                    frame = kept.clone();
+                    frame.timestamp_ns = timestamp_ns;
                 }
                 FaultKind::Blank => repaint(&mut frame, |_| [255; 3]),
                 FaultKind::Black => repaint(&mut frame, |_| [0; 3]),
@@ -183,7 +184,7 @@ impl FaultInjector {
 }
 
 /// Replaces the colour image and the right image by `color` of each pixel, and removes all detections.
-fn repaint(frame: &mut RgbdFrame, color: impl Fn(usize) -> [u8; 3]) {
+fn repaint(frame: &mut Frame, color: impl Fn(usize) -> [u8; 3]) {
     let mut image = RgbImage::new(frame.color.width(), frame.color.height());
     image.data_mut().iter_mut().enumerate().for_each(|(pixel, rgb)| *rgb = color(pixel));
     frame.color = Arc::new(image);
@@ -191,9 +192,11 @@ fn repaint(frame: &mut RgbdFrame, color: impl Fn(usize) -> [u8; 3]) {
     frame.detections = frame.detections.as_ref().map(|_| Vec::new());
 }
 
-fn remove_depth(frame: &mut RgbdFrame) {
-    let (width, height) = (frame.depth.raw.width(), frame.depth.raw.height());
-    frame.depth = Arc::new(DepthImage { raw: Image::new(width, height), metres_per_unit: frame.depth.metres_per_unit });
+fn remove_depth(frame: &mut Frame) {
+    if let Some(depth) = &frame.depth {
+        let raw = Image::new(depth.raw.width(), depth.raw.height());
+        frame.depth = Some(Arc::new(DepthImage { raw, metres_per_unit: depth.metres_per_unit }));
+    }
 }
 
 /// Returns grey levels from 4 to 19 without structure: one draw of SplitMix64 (Steele et al., OOPSLA 2014) per pixel.

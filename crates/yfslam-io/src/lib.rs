@@ -1,7 +1,7 @@
 //! Reads recordings, cameras and trajectories, and writes the products of a run.
 //!
 //! ```text
-//! folder ──Sequence──► entries ──FrameStream──► RgbdFrame, or a FrameError for a frame that cannot be used
+//! folder ──Sequence──► entries ──FrameStream──► Frame, or a FrameError for a frame that cannot be used
 //!   TUM, EuRoC, KITTI              decoded, stereo pairs rectified
 //! preset, settings file or TOML ──load_camera──► Camera
 //! frames ──FaultInjector──► frames as a faulty camera sends them ──RecordingWriter──► folder, with its BoxList

@@ -5,8 +5,7 @@
 //! Machine Vision and Applications 2000), and get the shortest focal length at which each pixel has a source in both images.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
-use yfslam::Camera;
-use yfslam::image::RgbImage;
+use yfslam::{Camera, RgbImage};
 
 /// Points along each side of an image from which the common field of view is computed.
 const BORDER_POINTS: usize = 64;
@@ -121,13 +120,10 @@ fn common_camera(turned: [(&Camera, &Rotation3<f64>); 2]) -> Option<Camera> {
     let focal = (spans[0] / (high[0] - low[0])).max(spans[1] / (high[1] - low[1]));
     let center = |k: usize| 0.5 * spans[k] - focal * 0.5 * (low[k] + high[k]);
     let overlaps = high[0] > low[0] && high[1] > low[1] && focal.is_finite();
-    overlaps.then(|| Camera {
-        fx: focal,
-        fy: focal,
-        cx: center(0),
-        cy: center(1),
-        distortion: [0.0; 5],
-        ..camera.clone()
+    overlaps.then(|| {
+        Camera::pinhole(camera.width, camera.height, focal, focal, center(0), center(1))
+            .with_fps(camera.fps)
+            .with_bf(camera.bf)
     })
 }
 
@@ -176,17 +172,11 @@ mod tests {
 
     /// Returns two cameras like those of EuRoC, slightly rotated against each other.
     fn cameras() -> [MountedCamera; 2] {
-        let camera = |fx: f64, cx: f64| Camera {
-            width: 376,
-            height: 240,
-            fx,
-            fy: fx - 0.6,
-            cx,
-            cy: 124.0,
-            distortion: [-0.283, 0.074, 0.0002, 2e-5, 0.0],
-            depth_factor: 5000.0,
-            fps: 20.0,
-            bf: 1.0,
+        let camera = |fx: f64, cx: f64| {
+            Camera::pinhole(376, 240, fx, fx - 0.6, cx, 124.0)
+                .with_distortion([-0.283, 0.074, 0.0002, 2e-5, 0.0])
+                .with_fps(20.0)
+                .with_bf(1.0)
         };
         let turn = UnitQuaternion::from_euler_angles(0.01, -0.012, 0.006);
         let right = Isometry3::from_parts(nalgebra::Translation3::new(0.11, 0.0008, -0.0005), turn);
@@ -254,7 +244,8 @@ mod tests {
         let [left, right] = cameras();
         let error = StereoRectification::new(&right, &left).unwrap_err();
         assert!(error.contains("not to its right"), "{error}");
-        let small = MountedCamera { camera: Camera { width: 100, ..right.camera.clone() }, ..right };
+        let mut small = right.clone();
+        small.camera.width = 100;
         assert!(StereoRectification::new(&left, &small).unwrap_err().contains("same size"));
     }
 }

@@ -29,7 +29,7 @@ fn frames_arrive_in_order_with_their_own_images() {
             assert_eq!(frame.timestamp_ns, 100_000_000_000 + i as i64 * 100_000_000);
             assert_eq!(frame.color.get(3, 2), Some(&[i as u8; 3]));
             let expected_m = (5000 + i) as f32 / 5000.0;
-            assert!((frame.depth.metres(3, 2).unwrap() - expected_m).abs() < 1e-6);
+            assert!((frame.depth.as_ref().unwrap().metres(3, 2).unwrap() - expected_m).abs() < 1e-6);
         }
     }
 }
@@ -100,13 +100,13 @@ fn a_recording_is_checked_against_its_camera_before_it_is_played() {
     let statistics = check_recording(&sequence, &camera()).unwrap().unwrap();
     assert!((statistics.median_m - 1.0004).abs() < 1e-9 && statistics.valid_share == 1.0, "{statistics:?}");
 
-    let refusal = |camera: &Camera| check_recording(&sequence, camera).unwrap_err().to_string();
-    let error = refusal(&Camera { depth_factor: 1e6, ..camera() });
+    let refusal = |camera: &CameraSource| check_recording(&sequence, camera).unwrap_err().to_string();
+    let error = refusal(&CameraSource { depth_factor: 1e6, ..camera() });
     assert!(
         error.contains("depth factor 1000000") && error.contains("--depth-factor 5000 it would be 1.0 m"),
         "{error}"
     );
-    let error = refusal(&Camera { width: 640, height: 480, ..camera() });
+    let error = refusal(&CameraSource { camera: Camera::pinhole(640, 480, 8.0, 8.0, 4.0, 3.0), ..camera() });
     assert!(
         error.contains("none of the first 30 frames") && error.contains("8×6 pixels, but the camera has 640×480"),
         "{error}"

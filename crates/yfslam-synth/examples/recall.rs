@@ -7,8 +7,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use yfslam::BoundingBox;
-use yfslam::image::RgbImage;
+use yfslam::{BoundingBox, RgbImage};
 use yfslam_io::write::write_color_png;
 use yfslam_synth::{World, parse};
 

@@ -7,7 +7,7 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use yfslam::image::Image;
+use yfslam::Image;
 use yfslam_io::write::write_color_png;
 use yfslam_synth::{SynthFrame, World, parse};
 
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Returns the measured depth as grey, with tinted actors.
 fn depth_image(shot: &SynthFrame) -> Result<Image<[u8; 3]>, Box<dyn Error>> {
-    let depth = &shot.frame.depth;
+    let depth = shot.frame.depth.as_deref().ok_or("a stereo camera has no depth image")?;
     let pixels = depth.raw.data().iter().zip(shot.instances.data()).map(|(&raw, &instance)| {
         let grey = (f32::from(raw) * depth.metres_per_unit / WHITE_M * 255.0).min(255.0) as u8;
         [grey, if instance > 0 { grey / 2 } else { grey }, grey]

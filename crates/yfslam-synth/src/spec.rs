@@ -56,17 +56,17 @@ pub fn split(spec: &str) -> (&str, &str) {
 /// # Errors
 /// The name or a key is unknown, or a value is malformed or out of range. The message lists the valid names.
 pub fn parse(spec: &str) -> Result<WorldConfig, WorldError> {
-    parse_with_camera(spec, default_camera())
+    parse_with_camera(spec, default_camera(), WorldConfig::default().depth_factor)
 }
 
-/// Parses a description for another camera than the default; its `width`, `height` and `fps` change that camera.
+/// Parses a description for another camera than the default and its depth units per metre; its `width`, `height` and `fps` change that camera.
 ///
 /// # Errors
 /// As for [`parse`], also if `camera` cannot be rendered.
-pub fn parse_with_camera(spec: &str, camera: Camera) -> Result<WorldConfig, WorldError> {
+pub fn parse_with_camera(spec: &str, camera: Camera, depth_factor: f64) -> Result<WorldConfig, WorldError> {
     let fail = |reason: String| WorldError::Spec { spec: spec.to_owned(), reason };
     let (name, query) = split(spec);
-    let mut config = WorldConfig { camera, ..WorldConfig::default() };
+    let mut config = WorldConfig { camera, depth_factor, ..WorldConfig::default() };
     let world =
         find(name).ok_or_else(|| fail(format!("unknown world `{name}`; the worlds are {}", names().join(", "))))?;
     world.apply(&mut config);
@@ -200,8 +200,8 @@ mod tests {
         let camera = parse("walking_xyz?stereo=0.2&width=320").unwrap().camera;
         assert!((camera.bf - 0.2 * 267.7).abs() < 1e-9, "{}", camera.bf);
         assert!(message("walking_xyz?stereo=-1").contains("between 0 and 2 m"));
-        let bent = Camera { distortion: [0.1, 0.0, 0.0, 0.0, 0.0], ..default_camera() };
-        let error = parse_with_camera("walking_xyz?stereo=0.11", bent).unwrap_err().to_string();
+        let bent = default_camera().with_distortion([0.1, 0.0, 0.0, 0.0, 0.0]);
+        let error = parse_with_camera("walking_xyz?stereo=0.11", bent, 5000.0).unwrap_err().to_string();
         assert!(error.contains("zero for a stereo camera"), "{error}");
     }
 

@@ -2,8 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 use yfslam::config::DepthSource;
-use yfslam::dynamic::Method;
-use yfslam::{Config, Slam};
+use yfslam::{Config, Method, Slam};
 use yfslam_synth::World;
 
 /// Returns the errors of the disparities of all features on smooth surfaces, px of their level, and the share of features that have

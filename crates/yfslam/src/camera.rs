@@ -1,12 +1,15 @@
 //! Pinhole camera with radial-tangential (Brown–Conrady) distortion, as OpenCV defines it.
 
+use serde::{Deserialize, Serialize};
+
 /// Frames per second of a camera that states none.
 const DEFAULT_FPS: f64 = 30.0;
 /// Baseline times focal length of an RGB-D camera that states none, px·m. Source: ORB-SLAM2 settings for TUM.
 const DEFAULT_BF: f64 = 40.0;
 
 /// Intrinsic calibration of a camera: of the colour image, to which depth is registered, or of the left image of a rectified pair.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Camera {
     /// Image width, px.
@@ -22,11 +25,22 @@ pub struct Camera {
     /// Principal point in y, px.
     pub cy: f64,
     /// Distortion coefficients k1, k2, p1, p2, k3 (OpenCV order), all zero for rectified images.
+    #[serde(default)]
     pub distortion: [f64; 5],
     /// Nominal frames per second.
+    #[serde(default = "default_fps")]
     pub fps: f64,
     /// Baseline times `fx`, px·m: of the stereo pair; of an RGB-D camera it scales the virtual disparity `bf / z` alone.
+    #[serde(default = "default_bf")]
     pub bf: f64,
+}
+
+fn default_fps() -> f64 {
+    DEFAULT_FPS
+}
+
+fn default_bf() -> f64 {
+    DEFAULT_BF
 }
 
 impl Camera {

@@ -1,8 +1,7 @@
 //! Converts an image to the network input: as large as possible without distortion, in the middle of a grey input.
 
 use fearless_simd::Level;
-use yfslam::BoundingBox;
-use yfslam::image::RgbImage;
+use yfslam::{BoundingBox, RgbImage};
 
 use crate::yolo::preprocess::Stretch;
 

@@ -3,8 +3,7 @@
 //!
 //! In: prototypes, coefficients, boxes. Out: the object and the class of each pixel.
 
-use yfslam::image::Image;
-use yfslam::{BoundingBox, Detection};
+use yfslam::{BoundingBox, Detection, Image};
 
 use super::letterbox::Letterbox;
 

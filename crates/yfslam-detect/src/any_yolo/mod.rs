@@ -13,8 +13,7 @@ use rten::{Model as Runtime, Value, ValueOrView};
 use rten_tensor::Layout as _;
 use rten_tensor::prelude::*;
 use rten_tensor::{NdTensorView, TensorView};
-use yfslam::image::{Image, RgbImage};
-use yfslam::{Detection, Detector, DetectorError};
+use yfslam::{Detection, Detector, DetectorError, Image, RgbImage};
 
 use crate::config::DetectorConfig;
 use crate::engine::onnx::Model;
@@ -37,7 +36,7 @@ const SIDES: std::ops::RangeInclusive<usize> = 32..=4096;
 /// use yfslam_detect::{AnyYolo, DetectorConfig};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # let image = yfslam::image::RgbImage::new(640, 480);
+/// # let image = yfslam::RgbImage::new(640, 480);
 /// let mut detector = AnyYolo::from_bytes("yolo.onnx", &std::fs::read("yolo.onnx")?, &DetectorConfig::default())?;
 /// let mut detections = Vec::new();
 /// detector.detect(&image, &mut detections)?;

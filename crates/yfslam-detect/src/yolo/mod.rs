@@ -8,8 +8,7 @@ pub(crate) mod preprocess;
 use std::path::Path;
 
 use fearless_simd::Level;
-use yfslam::image::RgbImage;
-use yfslam::{Detection, Detector, DetectorError};
+use yfslam::{Detection, Detector, DetectorError, RgbImage};
 
 use crate::config::DetectorConfig;
 use crate::engine::graph;

@@ -6,7 +6,7 @@
 //! image.
 
 use fearless_simd::{Level, dispatch};
-use yfslam::image::RgbImage;
+use yfslam::RgbImage;
 
 /// The sampling positions of the last image size.
 #[derive(Debug, Default)]

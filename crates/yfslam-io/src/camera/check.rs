@@ -2,6 +2,7 @@
 
 use yfslam::Camera;
 
+use super::CameraSource;
 use crate::error::{Error, Result};
 
 /// Largest side of an image, px.
@@ -10,12 +11,13 @@ const MAX_SIDE: usize = 16_384;
 /// Largest error after undistorting and distorting a point, px. Above it the distortion cannot be inverted.
 const MAX_ROUND_TRIP_PX: f64 = 0.5;
 
-/// Checks the calibration `camera`; `origin` names its source in error messages.
+/// Checks a calibration with its depth factor; error messages name its origin.
 ///
 /// # Errors
 /// A value is out of range: sizes, focal lengths, depth factor, rate and `bf` must be positive and finite, and the distortion must be
 /// invertible up to the border of the image.
-pub fn check_camera(camera: &Camera, origin: &str) -> Result<()> {
+pub fn check_camera(source: &CameraSource) -> Result<()> {
+    let CameraSource { camera, depth_factor, origin, .. } = source;
     let refuse = |problem: String, cure: &str| Err(Error::argument(format!("camera {origin}: {problem}"), cure));
     for (name, side) in [("width", camera.width), ("height", camera.height)] {
         if !(1..=MAX_SIDE).contains(&side) {
@@ -25,7 +27,7 @@ pub fn check_camera(camera: &Camera, origin: &str) -> Result<()> {
     let positive = [
         ("fx", camera.fx, "give the focal length in pixels"),
         ("fy", camera.fy, "give the focal length in pixels"),
-        ("depth factor", camera.depth_factor, "give the depth units per metre: 5000 for TUM, 1000 for millimetres"),
+        ("depth factor", *depth_factor, "give the depth units per metre: 5000 for TUM, 1000 for millimetres"),
         ("fps", camera.fps, "give the frames per second, such as 30"),
         ("bf", camera.bf, "give the baseline of the depth sensor times fx, such as 40"),
     ];

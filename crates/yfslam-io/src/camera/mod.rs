@@ -6,6 +6,7 @@ mod presets;
 
 use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
 use yfslam::Camera;
 
 use crate::error::{Error, Result};
@@ -22,10 +23,19 @@ const CAMERA_FILES: [&str; 3] = ["camera.toml", "camera.yaml", "camera.yml"];
 pub struct CameraSource {
     /// The calibration.
     pub camera: Camera,
+    /// Depth units per metre of the depth images that belong to it, such as 5000 for TUM and 1000 for millimetres.
+    pub depth_factor: f64,
     /// The preset or file, for display.
     pub origin: String,
     /// Keys of the file that were not used.
     pub unused_keys: Vec<String>,
+}
+
+impl CameraSource {
+    /// Makes the source of a camera whose sequence has no depth images.
+    pub(crate) fn without_depth(camera: Camera, origin: String) -> Self {
+        Self { camera, depth_factor: 1.0, origin, unused_keys: Vec::new() }
+    }
 }
 
 /// Loads the preset or file named `spec`; a relative path is tried as it is, then inside the folder `near`.
@@ -38,9 +48,7 @@ pub fn load_camera(spec: &str, near: Option<&Path>) -> Result<CameraSource> {
         return load_file(&path);
     }
     match preset(spec) {
-        Some(camera) => {
-            Ok(CameraSource { camera, origin: format!("preset {}", spec.to_ascii_lowercase()), unused_keys: vec![] })
-        }
+        Some(source) => Ok(source),
         None => {
             let problem = format!("camera '{spec}' is neither a file nor a preset");
             Err(Error::argument(
@@ -72,22 +80,44 @@ fn load_file(path: &Path) -> Result<CameraSource> {
     } else {
         parse_opencv_settings(&text, path)?
     };
-    check_camera(&source.camera, &source.origin)?;
+    check_camera(&source)?;
     Ok(source)
 }
 
-/// Parses the fields of [`Camera`] from TOML and refuses unknown keys.
+/// The keys of a camera file in TOML.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraKeys {
+    width: usize,
+    height: usize,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    #[serde(default)]
+    distortion: [f64; 5],
+    depth_factor: f64,
+    fps: Option<f64>,
+    bf: Option<f64>,
+}
+
+/// Parses a camera from TOML and refuses unknown keys.
 ///
 /// # Errors
 /// A syntax error, a missing or an unknown key, with its line.
 pub fn parse_toml(text: &str, path: &Path) -> Result<CameraSource> {
-    let camera = toml::from_str(text).map_err(|error| {
+    let keys: CameraKeys = toml::from_str(text).map_err(|error| {
         let start = error.span().map_or(0, |span| span.start);
         let line = 1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count();
         let cure = "the keys are width, height, fx, fy, cx, cy, depth_factor and, optionally, distortion, fps, bf";
         Error::line(path, line, error.message(), cure)
     })?;
-    Ok(CameraSource { camera, origin: path.display().to_string(), unused_keys: vec![] })
+    let mut camera = Camera::pinhole(keys.width, keys.height, keys.fx, keys.fy, keys.cx, keys.cy);
+    camera.distortion = keys.distortion;
+    camera.fps = keys.fps.unwrap_or(camera.fps);
+    camera.bf = keys.bf.unwrap_or(camera.bf);
+    let (depth_factor, origin) = (keys.depth_factor, path.display().to_string());
+    Ok(CameraSource { camera, depth_factor, origin, unused_keys: vec![] })
 }
 
 #[cfg(test)]

@@ -33,20 +33,14 @@ pub fn parse_opencv_settings(text: &str, path: &Path) -> Result<CameraSource> {
     for (value, name) in distortion.iter_mut().zip(["k1", "k2", "p1", "p2", "k3"]) {
         *value = settings.camera(name)?.unwrap_or(0.0);
     }
-    let camera = Camera {
-        width: settings.required_size("width")?,
-        height: settings.required_size("height")?,
-        fx,
-        fy,
-        cx: settings.required("cx")?,
-        cy: settings.required("cy")?,
-        distortion,
-        depth_factor: settings.depth_factor()?,
-        fps: settings.camera("fps")?.unwrap_or(30.0),
-        bf: bf.unwrap_or(40.0),
-    };
+    let (width, height) = (settings.required_size("width")?, settings.required_size("height")?);
+    let (cx, cy) = (settings.required("cx")?, settings.required("cy")?);
+    let mut camera = Camera::pinhole(width, height, fx, fy, cx, cy).with_distortion(distortion);
+    let depth_factor = settings.depth_factor()?;
+    camera.fps = settings.camera("fps")?.unwrap_or(camera.fps);
+    camera.bf = bf.unwrap_or(camera.bf);
     let unused_keys = settings.settings.into_keys().collect();
-    Ok(CameraSource { camera, origin: path.display().to_string(), unused_keys })
+    Ok(CameraSource { camera, depth_factor, origin: path.display().to_string(), unused_keys })
 }
 
 /// Removes known keys from the settings; the remaining ones are unused.

@@ -2,6 +2,8 @@
 
 use yfslam::Camera;
 
+use super::CameraSource;
+
 /// Names of the presets.
 pub const PRESETS: [&str; 4] = ["tum1", "tum2", "tum3", "bonn"];
 
@@ -9,8 +11,9 @@ pub const PRESETS: [&str; 4] = ["tum1", "tum2", "tum3", "bonn"];
 ///
 /// Sources: the ORB-SLAM2 settings for TUM RGB-D freiburg1, 2 and 3; the calibration published with the Bonn RGB-D Dynamic data set
 /// (Palazzolo et al., IROS 2019).
-pub fn preset(name: &str) -> Option<Camera> {
-    let (intrinsics, distortion, depth_factor) = match name.to_ascii_lowercase().as_str() {
+pub fn preset(name: &str) -> Option<CameraSource> {
+    let name = name.to_ascii_lowercase();
+    let (intrinsics, distortion, depth_factor) = match &*name {
         "tum1" => (
             [517.306408, 516.469215, 318.643040, 255.313989],
             [0.262383, -0.953104, -0.005358, 0.002628, 1.163314],
@@ -28,5 +31,6 @@ pub fn preset(name: &str) -> Option<Camera> {
         _ => return None,
     };
     let [fx, fy, cx, cy] = intrinsics;
-    Some(Camera { width: 640, height: 480, fx, fy, cx, cy, distortion, depth_factor, fps: 30.0, bf: 40.0 })
+    let camera = Camera::pinhole(640, 480, fx, fy, cx, cy).with_distortion(distortion);
+    Some(CameraSource { camera, depth_factor, origin: format!("preset {name}"), unused_keys: Vec::new() })
 }

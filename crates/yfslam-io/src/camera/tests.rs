@@ -21,7 +21,7 @@ fn a_settings_file_with_unusual_spacing_and_quotes_is_read() {
     assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (517.3, 516.5, 318.6, 255.3));
     assert_eq!(camera.distortion, [0.26, 0.0, 0.0, 0.0, 1.1]);
     assert_eq!(
-        (camera.width, camera.height, camera.bf, camera.depth_factor, camera.fps),
+        (camera.width, camera.height, camera.bf, source.depth_factor, camera.fps),
         (640, 480, 40.5, 5000.0, 30.0)
     );
     assert_eq!(source.unused_keys, ["System.File", "Viewer.PointSize"]);
@@ -35,7 +35,7 @@ fn keys_of_orb_slam3_and_indented_keys_are_read() {
          Tbc: !!opencv-matrix\n   rows: 4\n   data: [1.0, 0.0,\n     0.0, 1.0]\nStereo.T: [1,\n 2]\n",
     )
     .unwrap();
-    assert_eq!((source.camera.fx, source.camera.width, source.camera.depth_factor), (500.0, 640, 1000.0));
+    assert_eq!((source.camera.fx, source.camera.width, source.depth_factor), (500.0, 640, 1000.0));
     assert!((source.camera.bf - 40.0).abs() < 1e-9);
     assert_eq!(settings(&SETTINGS.replace("Camera.cy", "  Camera.cy")).unwrap().camera.cy, 255.3);
 }
@@ -66,17 +66,18 @@ fn invalid_numbers_lines_without_colon_and_repeated_keys_are_refused() {
 fn values_that_no_camera_has_are_refused() {
     let good = preset("tum1").unwrap();
     let check = |change: fn(&mut Camera)| {
-        let mut camera = good.clone();
-        change(&mut camera);
-        check_camera(&camera, "here").unwrap_err().to_string()
+        let mut source = CameraSource { origin: "here".into(), ..good.clone() };
+        change(&mut source.camera);
+        check_camera(&source).unwrap_err().to_string()
     };
-    check_camera(&good, "here").unwrap();
+    check_camera(&good).unwrap();
     assert!(check(|c| c.fx = 0.0).contains("camera here: fx is 0"));
     assert!(check(|c| c.fy = -1.0).contains("fy is -1"));
     assert!(check(|c| c.cx = f64::NAN).contains("NaN"));
     assert!(check(|c| c.width = 0).contains("width is 0"));
     assert!(check(|c| c.bf = 0.0).contains("bf is 0"));
-    assert!(check(|c| c.depth_factor = -5.0).contains("depth factor is -5"));
+    let negative = check_camera(&CameraSource { depth_factor: -5.0, ..good.clone() }).unwrap_err().to_string();
+    assert!(negative.contains("depth factor is -5"), "{negative}");
     assert!(check(|c| c.fps = f64::INFINITY).contains("fps is inf"));
     assert!(check(|c| c.distortion[0] = -40.0).contains("folds the image"));
 }
@@ -84,7 +85,7 @@ fn values_that_no_camera_has_are_refused() {
 #[test]
 fn every_preset_is_a_valid_camera() {
     for name in PRESETS {
-        check_camera(&preset(name).unwrap(), name).unwrap();
+        check_camera(&preset(name).unwrap()).unwrap();
         assert_eq!(load_camera(&name.to_uppercase(), None).unwrap().origin, format!("preset {name}"));
     }
 }
@@ -125,9 +126,10 @@ proptest! {
     #[test]
     fn a_check_of_arbitrary_values_never_panics(v in prop::array::uniform12(any::<f64>()), width in 0usize..70_000, height: usize) {
         let distortion = [v[4], v[5], v[6], v[7], v[8]];
-        let camera = Camera {
-            width, height, fx: v[0], fy: v[1], cx: v[2], cy: v[3], distortion, depth_factor: v[9], fps: v[10], bf: v[11],
-        };
-        let _ = check_camera(&camera, "here");
+        let camera = Camera::pinhole(width, height, v[0], v[1], v[2], v[3])
+            .with_distortion(distortion)
+            .with_fps(v[10])
+            .with_bf(v[11]);
+        let _ = check_camera(&CameraSource { camera, depth_factor: v[9], origin: "here".into(), unused_keys: vec![] });
     }
 }

@@ -1,6 +1,6 @@
 //! Baseline and progressive JPEG by `zune-jpeg`.
 
-use yfslam::image::RgbImage;
+use yfslam::RgbImage;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;

@@ -5,7 +5,7 @@ mod png;
 
 use std::fmt;
 
-use yfslam::image::{Image, RgbImage};
+use yfslam::{Image, RgbImage};
 
 /// Largest image that is decoded, px; it bounds the memory that a forged header can request.
 const MAX_PIXELS: usize = 1 << 25;

@@ -3,7 +3,7 @@
 use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
-use yfslam::image::{Image, RgbImage};
+use yfslam::{Image, RgbImage};
 
 use super::{
     COLOR_KIND_CURE, COLOR_SIZE_CURE, DEPTH_KIND_CURE, DEPTH_SIZE_CURE, DecodeError, ImageSize, MASK_SIZE_CURE,

@@ -3,18 +3,12 @@ use yfslam::{BoundingBox, Detection};
 use super::*;
 
 /// Returns frame `k` at 10 Hz, with `k` in its grey level and depth, and with one box.
-fn frame(k: i64) -> RgbdFrame {
+fn frame(k: i64) -> Frame {
     let color = RgbImage::from_vec(4, 2, vec![[100 + k as u8; 3]; 8]).unwrap();
     let raw = Image::from_vec(4, 2, vec![1000 + k as u16; 8]).unwrap();
     let bbox = BoundingBox { x_min: k as f32, ..Default::default() };
-    RgbdFrame {
-        timestamp_ns: 7_000_000_000 + k * 100_000_000,
-        color: Arc::new(color),
-        depth: Arc::new(DepthImage { raw, metres_per_unit: 0.0002 }),
-        right: None,
-        detections: Some(vec![Detection { class: 0, score: 1.0, bbox }]),
-        mask: None,
-    }
+    Frame::rgbd(7_000_000_000 + k * 100_000_000, color, DepthImage { raw, metres_per_unit: 0.0002 })
+        .with_detections(vec![Detection { class: 0, score: 1.0, bbox }])
 }
 
 /// Returns the deliveries of ten frames.
@@ -36,7 +30,7 @@ fn grey(delivery: &Delivery) -> u8 {
 }
 
 fn depth(delivery: &Delivery) -> u16 {
-    delivery.frame.depth.raw.data()[0]
+    delivery.frame.depth.as_ref().unwrap().raw.data()[0]
 }
 
 #[test]

@@ -51,7 +51,7 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
         let rectification = StereoRectification::new(&left, &right)
             .map_err(|problem| Error::content(&yaml, problem, "check T_BS of cam0 and cam1"))?;
         let camera = rectification.camera.clone();
-        check_camera(&camera, &yaml.display().to_string())?;
+        check_camera(&CameraSource::without_depth(camera.clone(), yaml.display().to_string()))?;
         let t_body_cam = left.t_body_cam * rectification.t_left_rectified();
         (calibration(camera, &yaml, Some(Arc::new(rectification))), t_body_cam)
     } else {
@@ -63,7 +63,7 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
 
 fn calibration(camera: Camera, yaml: &Path, rectification: Option<Arc<StereoRectification>>) -> Calibration {
     let origin = format!("{}{}", yaml.display(), if rectification.is_some() { ", rectified with cam1" } else { "" });
-    Calibration { camera: CameraSource { camera, origin, unused_keys: Vec::new() }, rectification }
+    Calibration { camera: CameraSource::without_depth(camera, origin), rectification }
 }
 
 /// Lists the images of a camera.
@@ -109,9 +109,10 @@ fn read_camera(path: &Path) -> Result<MountedCamera> {
     let fps = lists("rate_hz").ok().and_then(|rate| rate.first().copied()).unwrap_or(20.0);
     let distortion = [k1, k2, p1, p2, 0.0];
     let (width, height) = (width as usize, height as usize);
-    let camera = Camera { width, height, fx, fy, cx, cy, distortion, depth_factor: 5000.0, fps, bf: fx };
-    check_camera(&camera, &path.display().to_string())?;
-    Ok(MountedCamera { camera, t_body_cam })
+    let camera = Camera::pinhole(width, height, fx, fy, cx, cy).with_distortion(distortion).with_fps(fps).with_bf(fx);
+    let source = CameraSource::without_depth(camera, path.display().to_string());
+    check_camera(&source)?;
+    Ok(MountedCamera { camera: source.camera, t_body_cam })
 }
 
 /// Returns the numbers after `key:`, one or a list in brackets, which may extend over several lines.

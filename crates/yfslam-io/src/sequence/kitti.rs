@@ -6,9 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use yfslam::Camera;
 use yfslam::config::DepthSource;
-use yfslam::image::RgbImage;
+use yfslam::{Camera, RgbImage};
 
 use super::layout::{Calibration, Listing, stereo_or_mono};
 use super::lists::ListedFile;
@@ -57,8 +56,8 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     let (p_left, p_right) = (projection(&text, left, &calib)?, projection(&text, right, &calib)?);
     let camera =
         camera(folder, &entries.first().map(|entry| folder.join(&entry.color_path)), &p_left, &p_right, &stamps_ns)?;
-    check_camera(&camera, &calib.display().to_string())?;
-    let camera = CameraSource { camera, origin: calib.display().to_string(), unused_keys: Vec::new() };
+    let camera = CameraSource::without_depth(camera, calib.display().to_string());
+    check_camera(&camera)?;
     let calibration = Some(Calibration { camera, rectification: None });
     let ground_truth = GroundTruthReader::kitti(ground_truth_path(folder), t_cam0_cam(&p_left), stamps_ns);
     Ok(Listing { depth_source, entries, report, calibration, ground_truth })
@@ -97,18 +96,8 @@ fn camera(folder: &Path, first: &Option<PathBuf>, left: &Rows, right: &Rows, sta
         .map_err(|error| Error::content(path, error.to_string(), "unpack the sequence again"))?;
     let [fx, _, cx, of_left, _, fy, cy, ..] = *left;
     let span_s = stamps_ns.first().zip(stamps_ns.last()).map_or(0.0, |(first, last)| (last - first) as f64 * 1e-9);
-    Ok(Camera {
-        width: image.width(),
-        height: image.height(),
-        fx,
-        fy,
-        cx,
-        cy,
-        distortion: [0.0; 5],
-        depth_factor: 5000.0,
-        fps: if span_s > 0.0 { (stamps_ns.len() - 1) as f64 / span_s } else { 10.0 },
-        bf: of_left - right[3],
-    })
+    let fps = if span_s > 0.0 { (stamps_ns.len() - 1) as f64 / span_s } else { 10.0 };
+    Ok(Camera::pinhole(image.width(), image.height(), fx, fy, cx, cy).with_fps(fps).with_bf(of_left - right[3]))
 }
 
 /// Returns the pose of a camera in the frame of camera 0, to which it is parallel: P = K [1 | t] with t = −position.

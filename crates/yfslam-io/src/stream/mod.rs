@@ -11,9 +11,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use yfslam::config::DepthSource;
-use yfslam::image::{DepthImage, Image, RgbImage};
-use yfslam::{Camera, RgbdFrame};
+use yfslam::{DepthImage, Frame, RgbImage};
 
+use crate::camera::CameraSource;
 use crate::decode::{DecodeError, ImageSize, decode_color, decode_depth};
 use crate::error::{Error, Result};
 use crate::rectify::{Remap, StereoRectification};
@@ -48,9 +48,8 @@ pub struct FrameStream {
 /// The images that are paired with the colour images.
 enum PairedImages {
     Depth(PrefetchQueue<DepthImage>),
-    /// Right images, and the empty depth image of each frame.
-    Right(PrefetchQueue<RgbImage>, Arc<DepthImage>),
-    None(Arc<DepthImage>),
+    Right(PrefetchQueue<RgbImage>),
+    None,
 }
 
 impl FrameStream {
@@ -58,17 +57,17 @@ impl FrameStream {
     ///
     /// # Errors
     /// A thread cannot be started.
-    pub fn open(sequence: &Sequence, camera: &Camera, look_ahead: usize) -> Result<Self> {
+    pub fn open(sequence: &Sequence, source: &CameraSource, look_ahead: usize) -> Result<Self> {
+        let camera = &source.camera;
         let entries: Arc<[FrameEntry]> = sequence.entries.as_slice().into();
         let size = ImageSize { width: camera.width, height: camera.height };
-        let metres_per_unit = (1.0 / camera.depth_factor) as f32;
+        let metres_per_unit = (1.0 / source.depth_factor) as f32;
         let rectification = sequence.calibration.as_ref().and_then(|calibration| calibration.rectification.clone());
         let mut read_left = ColorReader { size, bytes: Vec::new(), rectification };
         let mut read_right = ColorReader { bytes: Vec::new(), ..read_left.clone() };
         let color = PrefetchQueue::start("yfslam-color", entries.clone(), look_ahead, move |entry| {
             read_left.read(&entry.color_path, StereoRectification::left)
         })?;
-        let no_depth = || Arc::new(DepthImage { raw: Image::new(size.width, size.height), metres_per_unit });
         let mut bytes = Vec::new();
         let paired_images = match sequence.depth_source {
             DepthSource::Image => {
@@ -77,12 +76,9 @@ impl FrameStream {
             }
             DepthSource::Stereo => {
                 let read = move |entry: &FrameEntry| read_right.read(paired_path(entry), StereoRectification::right);
-                PairedImages::Right(
-                    PrefetchQueue::start("yfslam-right", entries.clone(), look_ahead, read)?,
-                    no_depth(),
-                )
+                PairedImages::Right(PrefetchQueue::start("yfslam-right", entries.clone(), look_ahead, read)?)
             }
-            DepthSource::Motion => PairedImages::None(no_depth()),
+            DepthSource::Motion => PairedImages::None,
         };
         Ok(Self { entries, next: 0, color, paired_images, times: DecodeTimes::default() })
     }
@@ -91,8 +87,8 @@ impl FrameStream {
     pub fn depth_source(&self) -> DepthSource {
         match self.paired_images {
             PairedImages::Depth(_) => DepthSource::Image,
-            PairedImages::Right(..) => DepthSource::Stereo,
-            PairedImages::None(_) => DepthSource::Motion,
+            PairedImages::Right(_) => DepthSource::Stereo,
+            PairedImages::None => DepthSource::Motion,
         }
     }
 
@@ -103,7 +99,7 @@ impl FrameStream {
 }
 
 impl Iterator for FrameStream {
-    type Item = std::result::Result<RgbdFrame, FrameError>;
+    type Item = std::result::Result<Frame, FrameError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let index = self.next;
@@ -118,7 +114,9 @@ impl Iterator for FrameStream {
         self.times.paired_image += took;
         let frame = color.image.and_then(|color| {
             let (depth, right) = paired?;
-            Ok(RgbdFrame { timestamp_ns, color, depth, right, detections: None, mask: None })
+            let mut frame = Frame::mono(timestamp_ns, color);
+            (frame.depth, frame.right) = (depth, right);
+            Ok(frame)
         });
         Some(frame.map_err(|fault| FrameError { index, timestamp_ns, fault }))
     }
@@ -131,8 +129,8 @@ impl Iterator for FrameStream {
 
 impl ExactSizeIterator for FrameStream {}
 
-/// A depth image and, from a stereo camera, a right image.
-type DepthAndRight = (Arc<DepthImage>, Option<Arc<RgbImage>>);
+/// A depth image, or the right image of a stereo camera.
+type DepthAndRight = (Option<Arc<DepthImage>>, Option<Arc<RgbImage>>);
 
 impl PairedImages {
     /// Returns the next image and the time for reading and decoding it; waits until it is decoded.
@@ -140,13 +138,13 @@ impl PairedImages {
         match self {
             Self::Depth(queue) => {
                 let Decoded { image, took } = queue.next();
-                (image.map(|depth| (depth, None)), took)
+                (image.map(|depth| (Some(depth), None)), took)
             }
-            Self::Right(queue, no_depth) => {
+            Self::Right(queue) => {
                 let Decoded { image, took } = queue.next();
-                (image.map(|right| (no_depth.clone(), Some(right))), took)
+                (image.map(|right| (None, Some(right))), took)
             }
-            Self::None(no_depth) => (Ok((no_depth.clone(), None)), Duration::ZERO),
+            Self::None => (Ok((None, None)), Duration::ZERO),
         }
     }
 }

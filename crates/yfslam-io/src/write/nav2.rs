@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use yfslam::dense::grid::{GridCell, GroundGrid};
+use yfslam::dense::{GridCell, GroundGrid};
 
 use crate::atomic_file::write_atomically;
 use crate::error::Result;

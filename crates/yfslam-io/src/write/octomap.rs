@@ -7,7 +7,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use yfslam::dense::voxels::{Block, SIDE, Voxel};
+use yfslam::dense::{BLOCK_SIDE as SIDE, Block, Voxel};
 
 use crate::atomic_file::write_atomically;
 use crate::error::Result;

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use png::{BitDepth, ColorType, Compression, Encoder};
-use yfslam::image::{Image, RgbImage};
+use yfslam::{Image, RgbImage};
 
 use crate::atomic_file::write_atomically;
 use crate::error::Result;

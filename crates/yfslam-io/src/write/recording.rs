@@ -9,8 +9,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use yfslam::image::Image;
-use yfslam::{Camera, RgbdFrame};
+use yfslam::{Camera, Frame, Image};
 
 use super::png::{encode_color, encode_depth, encode_mask};
 use crate::atomic_file::Temporary;
@@ -76,12 +75,12 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// A file cannot be written, or an image is empty or missing.
-    pub fn write_images(&self, number: usize, frame: &RgbdFrame) -> Result<()> {
+    pub fn write_images(&self, number: usize, frame: &Frame) -> Result<()> {
         self.write_file(&color_name(number), |file| encode_color(&frame.color, file))?;
         self.write_file(&self.paired_name(number), |file| match &frame.right {
             Some(right) if self.stereo => encode_color(right, file),
             None if self.stereo => Err(io::Error::new(io::ErrorKind::InvalidData, "the frame has no right image")),
-            _ => encode_depth(&frame.depth.raw, file),
+            _ => encode_depth(frame.depth.as_ref().map_or(&Image::default(), |depth| &depth.raw), file),
         })
     }
 
@@ -117,7 +116,7 @@ impl RecordingWriter {
     ///
     /// # Errors
     /// A file cannot be written, or the folder cannot be moved.
-    pub fn finish(self, camera: &Camera, truth: &[StampedPose], boxes: &BoxList) -> Result<()> {
+    pub fn finish(self, camera: &Camera, depth_factor: f64, truth: &[StampedPose], boxes: &BoxList) -> Result<()> {
         let [color, paired, pairs] = &self.lists;
         self.write_text("rgb.txt", color)?;
         self.write_text(&format!("{}.txt", paired_folder(self.stereo)), paired)?;
@@ -126,7 +125,7 @@ impl RecordingWriter {
         }
         let camera = toml::to_string(camera)
             .map_err(|error| Error::write(&self.target.join("camera.toml"), io::Error::other(error)))?;
-        self.write_text("camera.toml", &camera)?;
+        self.write_text("camera.toml", &format!("{camera}depth_factor = {depth_factor:?}\n"))?;
         write_trajectory(&self.temporary.path().join("groundtruth.txt"), truth)?;
         boxes.write(&self.temporary.path().join(BOXES_FILE))?;
         let Self { temporary, target, replace, .. } = self;

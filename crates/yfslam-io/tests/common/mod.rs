@@ -11,18 +11,12 @@ use yfslam::Camera;
 pub const SIZE: (u32, u32) = (8, 6);
 
 /// Returns the camera of [`write_sequence`].
-pub fn camera() -> Camera {
-    Camera {
-        width: SIZE.0 as usize,
-        height: SIZE.1 as usize,
-        fx: 8.0,
-        fy: 8.0,
-        cx: 4.0,
-        cy: 3.0,
-        distortion: [0.0; 5],
+pub fn camera() -> CameraSource {
+    CameraSource {
+        camera: Camera::pinhole(SIZE.0 as usize, SIZE.1 as usize, 8.0, 8.0, 4.0, 3.0),
         depth_factor: 5000.0,
-        fps: 30.0,
-        bf: 40.0,
+        origin: "test".into(),
+        unused_keys: Vec::new(),
     }
 }
 

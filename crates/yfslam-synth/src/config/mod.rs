@@ -39,9 +39,10 @@ pub struct WorldConfig {
     pub frames: usize,
     /// Seed of textures, people, paths and noise.
     pub seed: u64,
-    /// Camera, including its lens distortion. Its `fps` is the frame rate, its `depth_factor` the unit of depth, its `bf` the
-    /// baseline of the depth sensor.
+    /// Camera, including its lens distortion. Its `fps` is the frame rate, its `bf` the baseline of the depth sensor.
     pub camera: Camera,
+    /// Depth units per metre.
+    pub depth_factor: f64,
     /// Distance of a second camera to the right of the first, m; 0 for none. A stereo camera has no depth image and no lens
     /// distortion, and `camera.bf` is this distance times `camera.fx`.
     pub stereo_m: f64,
@@ -71,6 +72,7 @@ impl Default for WorldConfig {
             frames: 300,
             seed: 1,
             camera: default_camera(),
+            depth_factor: 5000.0,
             stereo_m: 0.0,
             hand_shake: 1.0,
             light: LightConfig::default(),
@@ -101,18 +103,7 @@ pub struct ActorsConfig {
 
 /// Returns the calibration of freiburg3 from the web page of the TUM benchmark, which has no distortion.
 pub fn default_camera() -> Camera {
-    Camera {
-        width: 640,
-        height: 480,
-        fx: 535.4,
-        fy: 539.2,
-        cx: 320.1,
-        cy: 247.6,
-        distortion: [0.0; 5],
-        depth_factor: 5000.0,
-        fps: 30.0,
-        bf: 40.0,
-    }
+    Camera::pinhole(640, 480, 535.4, 539.2, 320.1, 247.6)
 }
 
 #[cfg(test)]

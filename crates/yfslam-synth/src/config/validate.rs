@@ -30,8 +30,8 @@ impl WorldConfig {
         check(finite(&[camera.cx, camera.cy]), "camera.cx, camera.cy", camera.cx, "finite")?;
         check(finite(&camera.distortion), "camera.distortion", format!("{:?}", camera.distortion), "finite")?;
         check((1e-3..=1e3).contains(&camera.fps), "camera.fps", camera.fps, "between 0.001 and 1000 Hz")?;
-        let factor = camera.depth_factor;
-        check((1.0..=1e6).contains(&factor), "camera.depth_factor", factor, "between 1 and 1000000 units per metre")?;
+        let factor = self.depth_factor;
+        check((1.0..=1e6).contains(&factor), "depth_factor", factor, "between 1 and 1000000 units per metre")?;
         check(camera.bf.is_finite() && camera.bf >= 0.0, "camera.bf", camera.bf, "at least 0 px·m")?;
         check((0.0..=2.0).contains(&self.stereo_m), "stereo_m", self.stereo_m, "between 0 and 2 m")?;
         if self.stereo_m > 0.0 {

@@ -90,7 +90,8 @@ mod tests {
 
     /// Returns the width, height and sum of a white dot at 2 m after blurring by `motion`, where it exceeds a tenth.
     fn smeared_dot(motion: Isometry3<f64>) -> (usize, usize, f32) {
-        let camera = Camera { width: 64, height: 48, cx: 32.0, cy: 24.0, ..default_camera() };
+        let Camera { fx, fy, .. } = default_camera();
+        let camera = Camera::pinhole(64, 48, fx, fy, 32.0, 24.0);
         let mut color = vec![[0.0; 3]; 64 * 48];
         color[24 * 64 + 32] = [1.0; 3];
         let moved = CameraMove::between(&Isometry3::identity(), &motion);

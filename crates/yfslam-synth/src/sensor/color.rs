@@ -3,7 +3,7 @@
 //! In: linear RGB. Out: an [`RgbImage`].
 
 use rayon::prelude::*;
-use yfslam::image::RgbImage;
+use yfslam::RgbImage;
 
 use crate::rng::{hash, normals4};
 

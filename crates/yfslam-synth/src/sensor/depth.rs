@@ -5,8 +5,7 @@
 //! constants are in [`SensorConfig`].
 
 use rayon::prelude::*;
-use yfslam::Camera;
-use yfslam::image::{DepthImage, Image};
+use yfslam::{Camera, DepthImage, Image};
 
 use crate::config::SensorConfig;
 use crate::render::Rendering;
@@ -14,7 +13,14 @@ use crate::render::rays::RayTable;
 use crate::rng::{hash, normals4};
 
 /// Measures the exact depth of a rendering.
-pub fn measure(exact: &Rendering, rays: &RayTable, camera: &Camera, sensor: &SensorConfig, seed: u64) -> DepthImage {
+pub fn measure(
+    exact: &Rendering,
+    rays: &RayTable,
+    camera: &Camera,
+    depth_factor: f64,
+    sensor: &SensorConfig,
+    seed: u64,
+) -> DepthImage {
     let (width, bf) = (camera.width, camera.bf as f32);
     let least_cosine = sensor.max_angle_deg.to_radians().cos();
     let by_angle = sensor.max_angle_deg < 90.0 || sensor.depth_noise_angle > 0.0 || sensor.min_return > 0.0;
@@ -38,13 +44,13 @@ pub fn measure(exact: &Rendering, rays: &RayTable, camera: &Camera, sensor: &Sen
                 let measured = disturb(z, bf, cosine, sensor, draws[0]);
                 if (sensor.min_depth_m..=sensor.max_depth_m).contains(&measured) {
                     // Depth that exceeds sixteen bits is not measured.
-                    let value = f64::from(measured) * camera.depth_factor + 0.5;
+                    let value = f64::from(measured) * depth_factor + 0.5;
                     *unit = if value < 65_536.0 { value as u16 } else { 0 };
                 }
             }
         },
     );
-    DepthImage { raw, metres_per_unit: (1.0 / camera.depth_factor) as f32 }
+    DepthImage { raw, metres_per_unit: (1.0 / depth_factor) as f32 }
 }
 
 /// Relative spread of the angle and of the returned light at which depth is lost, which gives holes a ragged border.
@@ -111,14 +117,16 @@ mod tests {
     use crate::config::default_camera;
 
     fn camera() -> Camera {
-        Camera { width: 200, height: 100, ..default_camera() }
+        let mut camera = default_camera();
+        (camera.width, camera.height) = (200, 100);
+        camera
     }
 
     /// Measures surfaces of the given depth and reflectance.
     fn measured(exact: Vec<f32>, reflectance: f32, sensor: &SensorConfig) -> DepthImage {
         let pixels = exact.len();
         let rendering = Rendering { depth: exact, reflectance: vec![reflectance; pixels], ..Rendering::default() };
-        measure(&rendering, &RayTable::new(&camera()), &camera(), sensor, 1)
+        measure(&rendering, &RayTable::new(&camera()), &camera(), 5000.0, sensor, 1)
     }
 
     fn missing(image: &DepthImage) -> f64 {
@@ -132,12 +140,12 @@ mod tests {
             let slope = degrees.to_radians().tan();
             (0..20_000).map(|i| 2.0 / (1.0 - slope * ((i % 200) as f32 - 100.0) / 20_000.0)).collect()
         };
-        let long = Camera { fx: 20_000.0, fy: 20_000.0, cx: 100.0, cy: 50.0, ..camera() };
+        let long = Camera::pinhole(200, 100, 20_000.0, 20_000.0, 100.0, 50.0);
         let lost = |degrees: f32| {
             let depth = wall(degrees);
             let rendering = Rendering { reflectance: vec![0.5; depth.len()], depth, ..Rendering::default() };
             let sensor = SensorConfig { max_angle_deg: 80.0, ..SensorConfig::perfect() };
-            missing(&measure(&rendering, &RayTable::new(&long), &long, &sensor, 1))
+            missing(&measure(&rendering, &RayTable::new(&long), &long, 5000.0, &sensor, 1))
         };
         assert_eq!((lost(0.0), lost(60.0)), (0.0, 0.0));
         assert!((0.2..0.8).contains(&lost(80.0)), "{}", lost(80.0));

@@ -8,8 +8,7 @@ mod distance;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use yfslam::image::{DepthImage, Image, RgbImage};
-use yfslam::{BoundingBox, Camera, Detection, RgbdFrame};
+use yfslam::{BoundingBox, Camera, DepthImage, Detection, Frame, Image, RgbImage};
 
 use crate::actors::Actors;
 use crate::bake::Baker;
@@ -49,7 +48,7 @@ pub struct World {
 #[derive(Clone, Debug)]
 pub struct SynthFrame {
     /// The input of a SLAM system. It has detections if [`WorldConfig::detections`] is set.
-    pub frame: RgbdFrame,
+    pub frame: Frame,
     /// Time of the depth image, ns: that of the colour image plus [`SensorConfig::depth_offset_s`](crate::SensorConfig).
     pub depth_timestamp_ns: i64,
     /// Exact pose at the time of the colour image: world from camera.
@@ -126,25 +125,17 @@ impl World {
         let color = self.expose(&self.rays, &rendering, time, &Isometry3::identity(), hash(noise, 0));
         let mount = Isometry3::translation(self.config.stereo_m, 0.0, 0.0);
         let right = (self.config.stereo_m > 0.0).then(|| self.second(&self.rays, index, &mount));
-        let depth = match right {
-            Some(_) => DepthImage { raw: Image::new(self.rays.width, self.rays.height), metres_per_unit: 1.0 },
-            None => self.measure(&rendering, time, hash(noise, 1)),
-        };
+        let depth = right.is_none().then(|| Arc::new(self.measure(&rendering, time, hash(noise, 1))));
         let (width, height) = (self.rays.width, self.rays.height);
         let boxes = self.boxes(&rendering.instance);
         let detections = self.config.detections.then(|| {
             boxes.iter().map(|&(_, class, bbox)| Detection { class, score: 1.0, bbox }).collect::<Vec<Detection>>()
         });
+        let mut frame = Frame::mono(to_ns(time), color);
+        (frame.depth, frame.right, frame.detections) = (depth, right.map(Arc::new), detections);
         SynthFrame {
             depth_timestamp_ns: to_ns(time + self.config.sensor.depth_offset_s),
-            frame: RgbdFrame {
-                timestamp_ns: to_ns(time),
-                color: Arc::new(color),
-                depth: Arc::new(depth),
-                right: right.map(Arc::new),
-                detections,
-                mask: None,
-            },
+            frame,
             t_world_cam,
             instances: image(width, height, rendering.instance),
             exact_depth: image(width, height, rendering.depth),
@@ -205,7 +196,8 @@ impl World {
             let time = time + sensor.depth_offset_s;
             self.render(&self.rays, time, &self.path.pose(time))
         });
-        sensor::depth::measure(later.as_ref().unwrap_or(rendering), &self.rays, camera, sensor, seed)
+        let rendering = later.as_ref().unwrap_or(rendering);
+        sensor::depth::measure(rendering, &self.rays, camera, self.config.depth_factor, sensor, seed)
     }
 
     /// Returns the mean brightness of the image, as measured by automatic exposure.
@@ -247,15 +239,12 @@ impl World {
 /// Returns the camera for the same view in an image of the given width.
 fn shrink(camera: &Camera, width: usize) -> Camera {
     let scale = camera.width as f64 / width as f64;
-    Camera {
-        width,
-        height: ((camera.height as f64 / scale).round() as usize).max(1),
-        fx: camera.fx / scale,
-        fy: camera.fy / scale,
-        cx: (camera.cx + 0.5) / scale - 0.5,
-        cy: (camera.cy + 0.5) / scale - 0.5,
-        ..camera.clone()
-    }
+    let mut shrunk = camera.clone();
+    shrunk.width = width;
+    shrunk.height = ((camera.height as f64 / scale).round() as usize).max(1);
+    (shrunk.fx, shrunk.fy) = (camera.fx / scale, camera.fy / scale);
+    (shrunk.cx, shrunk.cy) = ((camera.cx + 0.5) / scale - 0.5, (camera.cy + 0.5) / scale - 0.5);
+    shrunk
 }
 
 fn to_ns(seconds: f64) -> i64 {

@@ -1,6 +1,6 @@
 use std::collections::BTreeSet;
 
-use yfslam::dense::voxels::block_of;
+use yfslam::dense::block_of;
 
 use super::*;
 
