@@ -419,7 +419,7 @@ fn depth_with_an_offset_of_one_frame_is_the_depth_of_the_next_frame_with_its_sta
     let raw = |shot: &SynthFrame| shot.frame.depth.clone().unwrap().raw.data().to_vec();
     let depths = raw(&lagged).into_iter().zip(raw(&second));
     // A pose that differs in the last digit may move a pixel over an edge.
-    let differ = depths.filter(|(a, b)| a.abs_diff(**b) > 1).count();
+    let differ = depths.filter(|(a, b)| a.abs_diff(*b) > 1).count();
     assert!(differ < 20, "{differ} pixels differ");
 }
 
