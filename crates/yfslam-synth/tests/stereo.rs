@@ -14,7 +14,7 @@ fn disparity_errors(spec: &str, frames: impl Iterator<Item = usize>) -> (Vec<f64
     config.depth.source = DepthSource::Stereo;
     config.dynamic.method = Method::None;
     let scale_factor = f64::from(config.features.scale_factor);
-    let mut slam = Slam::new(config, camera, None).unwrap();
+    let mut slam = Slam::builder(camera.clone()).config(config).build().unwrap();
     let (mut errors, mut all) = (Vec::new(), 0);
     for index in frames {
         let shot = world.frame(index);
