@@ -4,8 +4,8 @@ use anyhow::Result;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 
-use crate::cli::Cli;
-use crate::terminal::print;
+use crate::command::cli::Cli;
+use crate::ui::terminal::print;
 
 const EXAMPLES: &str = "\
 Examples:

@@ -3,8 +3,8 @@
 use anyhow::Result;
 use clap::Args;
 
-use crate::settings::{MethodArg, SettingsArgs};
-use crate::terminal::print;
+use crate::input::settings::{MethodArg, SettingsArgs};
+use crate::ui::terminal::print;
 
 const EXAMPLES: &str = "\
 Examples:

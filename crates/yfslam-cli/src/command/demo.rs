@@ -7,9 +7,9 @@ use anyhow::Result;
 use clap::{Args, value_parser};
 
 use super::run::{self, RunArgs};
-use crate::html::quote;
-use crate::settings::{MethodArg, describe};
-use crate::terminal::Terminal;
+use crate::input::settings::{MethodArg, describe};
+use crate::output::html::quote;
+use crate::ui::terminal::Terminal;
 
 const EXAMPLES: &str = "\
 Examples:

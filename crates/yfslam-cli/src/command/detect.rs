@@ -11,14 +11,14 @@ use yfslam_detect::DetectorConfig;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
 
-use crate::apart::Apart;
-use crate::detector::{self, DetectorArgs, LoadedDetector};
-use crate::found::{FoundBox, FoundIn, FoundList, Look};
-use crate::output::OutputFolder;
-use crate::overlay;
-use crate::pipeline::StageSummary;
-use crate::progress::Progress;
-use crate::terminal::{Terminal, explain};
+use crate::input::detector::{self, DetectorArgs, LoadedDetector};
+use crate::input::instance_detector::Apart;
+use crate::output::detections_file::{FoundBox, FoundIn, FoundList, Look};
+use crate::output::folder::OutputFolder;
+use crate::output::overlay;
+use crate::stats::stages::StageSummary;
+use crate::ui::progress::Progress;
+use crate::ui::terminal::{Terminal, explain};
 
 const EXAMPLES: &str = "\
 Examples:

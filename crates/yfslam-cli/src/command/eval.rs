@@ -10,8 +10,8 @@ use yfslam_eval::{
     Delta, EvalOptions, Evaluation, RpeOptions, Statistics, Table, TableStyle, evaluate, improvement_percent,
 };
 
-use crate::accuracy::{MatchArgs, judge, read_poses, to_eval};
-use crate::terminal::{Terminal, print};
+use crate::run::evaluation::{MatchArgs, judge, read_poses, to_eval};
+use crate::ui::terminal::{Terminal, print};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -13,8 +13,8 @@ use yfslam_io::sequence::{AssociationReport, FrameEntry, Layout};
 use yfslam_io::time::{format_stamp, seconds};
 use yfslam_io::{CameraSource, DepthStatistics, Sequence};
 
-use crate::source::{SourceArgs, open_sequence, world_camera};
-use crate::terminal::{explain, print};
+use crate::input::source::{SourceArgs, open_sequence, world_camera};
+use crate::ui::terminal::{explain, print};
 
 /// Frames that are opened, evenly over the sequence.
 const SAMPLES: usize = 20;

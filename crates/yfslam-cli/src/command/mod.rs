@@ -1,6 +1,7 @@
 //! One file per subcommand.
 
 pub mod bench;
+pub mod cli;
 pub mod completions;
 pub mod config;
 pub mod demo;
@@ -13,8 +14,8 @@ pub mod synth;
 
 use anyhow::Result;
 
-use crate::cli::{Cli, Command};
-use crate::terminal::Terminal;
+use self::cli::{Cli, Command};
+use crate::ui::terminal::Terminal;
 
 /// Does what the command line asks for.
 ///

@@ -10,9 +10,9 @@ use yfslam_io::write::ListedStamps;
 use yfslam_io::{BoxList, Delivery, Fault, FaultInjector, RecordingWriter, StampedPose};
 use yfslam_synth::{CLASS_NAMES, SUITE, SynthFrame, World};
 
-use crate::progress::Progress;
-use crate::source::SourceArgs;
-use crate::terminal::{Terminal, print};
+use crate::input::source::SourceArgs;
+use crate::ui::progress::Progress;
+use crate::ui::terminal::{Terminal, print};
 
 /// Frames in memory at a time, for each thread.
 const BATCH_PER_THREAD: usize = 4;

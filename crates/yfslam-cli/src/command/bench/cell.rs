@@ -1,0 +1,143 @@
+//! One cell of the table, and the group of cells that one run fills.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::Result;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use yfslam_io::write_atomically;
+
+use crate::output::folder::FAILURE_FILE;
+
+/// The cells of one sequence and one seed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Name in the table.
+    pub sequence: String,
+    /// As `yfslam run` takes it.
+    pub source: String,
+    /// Names of methods, each once.
+    pub methods: Vec<String>,
+    /// Of the world, or of the method's random draws.
+    pub seed: u64,
+    /// Words that set frames and seed.
+    pub options: Vec<String>,
+    /// Words that name a detector, for methods that need one.
+    pub detector: Vec<String>,
+    /// Whether it is all of a recorded sequence, as it was recorded: only then may it stand beside published figures.
+    pub whole: bool,
+}
+
+impl Group {
+    /// Name of the group's folder.
+    pub fn key(&self) -> String {
+        let name: String = self.sequence.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        format!("{name}-{}", self.seed)
+    }
+
+    /// Words for this program to run some of the methods, but for the output folder.
+    pub fn arguments(&self, methods: &[&str], extra: &[String]) -> Vec<String> {
+        let words = ["run", &self.source, "--method", &methods.join(",")].map(str::to_owned);
+        let detector = if methods.iter().any(|method| *method != "none") { &self.detector[..] } else { &[] };
+        words.into_iter().chain([&self.options, detector, extra].concat()).collect()
+    }
+}
+
+/// What came of one method.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cell {
+    /// Name in the table.
+    pub sequence: String,
+    /// Name of the method.
+    pub method: String,
+    /// Of the world, or of the method's random draws.
+    pub seed: u64,
+    /// Absolute trajectory error after alignment by SE(3), RMSE, m.
+    pub ate_rmse_m: Option<f64>,
+    /// The same, standard deviation, m.
+    pub ate_std_m: Option<f64>,
+    /// Share of the frames whose pose is known.
+    pub tracked: Option<f64>,
+    /// Relative pose error over a frame, RMSE, m.
+    pub rpe_frame_m: Option<f64>,
+    /// Relative pose error over a second, RMSE, m.
+    pub rpe_second_m: Option<f64>,
+    /// The same, standard deviation, m.
+    pub rpe_second_std_m: Option<f64>,
+    /// Its rotation, RMSE, degrees.
+    pub rpe_second_deg: Option<f64>,
+    /// The same, standard deviation, degrees.
+    pub rpe_second_std_deg: Option<f64>,
+    /// Median wall time of each stage of the run, ms.
+    pub stages_ms: BTreeMap<String, f64>,
+    /// Processor time of tracking and detection for a frame, ms.
+    pub cpu_ms_per_frame: Option<f64>,
+    /// As of its [`Group`].
+    pub whole: bool,
+    /// Why there are no figures.
+    pub failure: Option<String>,
+    /// Words with which this program runs the cell alone, to the same figures.
+    pub arguments: Vec<String>,
+    /// CRC-32 of the program that ran.
+    pub program_crc32: String,
+}
+
+impl Cell {
+    /// The figures of a method from what its run left in `folder`; `failure` if it left nothing.
+    pub fn of_run(
+        group: &Group,
+        method: &str,
+        folder: &Path,
+        failure: Option<&str>,
+        arguments: Vec<String>,
+        program_crc32: String,
+    ) -> Self {
+        let text = std::fs::read_to_string(folder.join("run.json")).unwrap_or_default();
+        let run: Value = serde_json::from_str(&text).unwrap_or_default();
+        let figure = |place: &str| run.pointer(place).and_then(Value::as_f64);
+        let ate_rmse_m = figure("/evaluation/ate/translation_m/rmse");
+        let frames = figure("/frames/read").filter(|frames| *frames > 0.0);
+        let own_failure = || Some(std::fs::read_to_string(folder.join(FAILURE_FILE)).ok()?.trim().to_owned());
+        let failure = match run {
+            Value::Null => own_failure().or_else(|| failure.map(str::to_owned)),
+            _ if ate_rmse_m.is_none() => Some("no ground truth to judge it by".into()),
+            _ => None,
+        };
+        let stages = run.pointer("/times").and_then(Value::as_object).into_iter().flatten();
+        let median = |(name, stage): (&String, &Value)| Some((name.clone(), stage.get("median_ms")?.as_f64()?));
+        Self {
+            sequence: group.sequence.clone(),
+            method: method.to_owned(),
+            seed: group.seed,
+            ate_rmse_m,
+            ate_std_m: figure("/evaluation/ate/translation_m/std"),
+            tracked: figure("/evaluation/coverage/fraction"),
+            rpe_frame_m: figure("/evaluation/rpe/0/translation_m/rmse"),
+            rpe_second_m: figure("/evaluation/rpe/1/translation_m/rmse"),
+            rpe_second_std_m: figure("/evaluation/rpe/1/translation_m/std"),
+            rpe_second_deg: figure("/evaluation/rpe/1/rotation_deg/rmse"),
+            rpe_second_std_deg: figure("/evaluation/rpe/1/rotation_deg/std"),
+            stages_ms: stages.filter_map(median).collect(),
+            cpu_ms_per_frame: figure("/cpu_s").zip(frames).map(|(cpu_s, frames)| 1e3 * cpu_s / frames),
+            whole: group.whole,
+            failure,
+            arguments,
+            program_crc32,
+        }
+    }
+
+    /// The cell at `path`, if a whole one is there.
+    pub fn read(path: &Path) -> Option<Self> {
+        serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()
+    }
+
+    /// Writes the cell to `path`.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let json = serde_json::to_string_pretty(self)?;
+        Ok(write_atomically(path, |file| writeln!(file, "{json}"))?)
+    }
+}

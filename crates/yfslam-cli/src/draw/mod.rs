@@ -1,0 +1,4 @@
+//! Drawing on images.
+
+pub mod dense_image;
+pub mod shapes;

@@ -1,0 +1,7 @@
+//! What a run works on: sequences, masks, boxes, detectors, settings.
+
+pub mod boxes;
+pub mod detector;
+pub mod instance_detector;
+pub mod settings;
+pub mod source;

@@ -1,0 +1,166 @@
+//! Recorded sequences: folders in TUM RGB-D, Bonn, EuRoC or KITTI odometry layout.
+
+use std::io::ErrorKind;
+use std::time::Instant;
+
+use anyhow::{Result, ensure};
+use yfslam::config::DepthSource;
+use yfslam::{Camera, Detection, RgbdFrame};
+use yfslam_io::boxes::KnownDetections;
+use yfslam_io::camera::check_camera;
+use yfslam_io::decode::DecodeError;
+use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
+use yfslam_io::{
+    BoxList, CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, detect_camera,
+    load_camera,
+};
+
+use super::masks::Masks;
+use super::{FolderKnowledge, Frames, Player, Source, SourceArgs};
+use crate::stats::skip::Skip;
+use crate::stats::stages::Stages;
+
+/// Frames of the whole sequence that are tried where the first ones are unusable.
+const PROBES: usize = 30;
+
+/// Opens the folder, finds its camera and checks both against the first frames; reads its boxes of the classes that `own_boxes` names.
+pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Source> {
+    let (sequence, camera) = open_sequence(args, configured)?;
+    let camera = camera?;
+    if !camera.unused_keys.is_empty() {
+        tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "not used of the camera file");
+    }
+    check(&sequence, &camera.camera)?;
+    let boxes = match own_boxes {
+        Some(classes) => Some(BoxList::read(&args.boxes_file())?.detections(classes)),
+        None => None,
+    };
+    let masks = args.masks.as_deref().map(|folder| Masks::open(folder, &sequence, &camera.camera)).transpose()?;
+    let tally = masks.as_ref().map(|masks| masks.tally.clone());
+    let stream = FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?;
+    let known = FolderKnowledge { boxes, mirror: sequence.mirror, masks };
+    let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();
+    Ok(Source {
+        name: name(args),
+        camera,
+        depth_source: sequence.depth_source,
+        frames: Frames::new(Player::Folder(stream, Box::new(known)), sequence.depth_source, args, &stamps_ns),
+        stamps_ns,
+        association: Some(sequence.report),
+        truth_reader: Some(sequence.truth),
+        masks: tally,
+        mirror: sequence.mirror,
+    })
+}
+
+/// Checks camera and depth factor against the first frames or, where those are unusable, against frames of the whole sequence: a
+/// sensor may wake up late.
+fn check(sequence: &Sequence, camera: &Camera) -> Result<()> {
+    let Err(error) = check_recording(sequence, camera) else { return Ok(()) };
+    let step = sequence.entries.len().div_ceil(PROBES).max(1);
+    let entries = sequence.entries.iter().step_by(step).cloned().collect();
+    match (&error, check_recording(&Sequence { entries, ..sequence.clone() }, camera)) {
+        (Error::Content { .. }, Ok(_)) => Ok(()),
+        _ => Err(error.into()),
+    }
+}
+
+/// Reads the lists of the folder for what `configured` says of depth, if no flag does, and the camera: the one that was asked for, or the
+/// folder's.
+///
+/// # Errors
+/// A tolerance that is none, or a folder without usable lists.
+pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequence, Result<CameraSource>)> {
+    let tolerance_ms = args.association_tolerance;
+    ensure!(
+        (0.0..=1e6).contains(&tolerance_ms),
+        "--association-tolerance is {tolerance_ms}; give milliseconds, such as 20"
+    );
+    let options = SequenceOptions {
+        depth_source: args.wanted_depth_source(configured),
+        association_tolerance_ns: (tolerance_ms * 1e6) as i64,
+        start: args.start,
+        end: args.end,
+        reverse: args.reverse,
+    };
+    let mut sequence = Sequence::open(args.folder(), &options)?;
+    if args.camera.is_some() {
+        // Pictures are taken to be of that camera as they are.
+        sequence.calibration = None;
+    }
+    let camera = camera(args, &sequence);
+    Ok((sequence, camera))
+}
+
+fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
+    let mut source = match (&args.camera, &sequence.calibration) {
+        (Some(spec), _) => load_camera(spec, Some(args.folder()))?,
+        (None, Some(calibration)) => calibration.camera.clone(),
+        (None, None) => detect_camera(args.folder())?,
+    };
+    if let Some(factor) = args.depth_factor {
+        source.camera.depth_factor = factor;
+        source.origin += &format!(" with --depth-factor {factor}");
+        check_camera(&source.camera, &source.origin)?;
+    }
+    Ok(source)
+}
+
+/// The folder's own name, also for `.` and the like.
+fn name(args: &SourceArgs) -> String {
+    let folder = args.folder().canonicalize().unwrap_or_else(|_| args.folder().into());
+    folder.file_name().map_or("sequence".into(), |name| name.to_string_lossy().into_owned())
+}
+
+pub fn next(stream: &mut FrameStream, known: &FolderKnowledge, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
+    let before = stream.times();
+    let frame = stream.next()?;
+    let after = stream.times();
+    stages.push("decode color", after.color - before.color);
+    let companion = after.companion - before.companion;
+    match stream.companion() {
+        DepthSource::Image => stages.push("decode depth", companion),
+        DepthSource::Stereo => stages.push("decode right", companion),
+        DepthSource::Motion => {}
+    }
+    stages.push("decode wait", after.waited - before.waited);
+    let frame = frame.map_err(|error| Skip { reason: reason(&error.fault), message: error.to_string() });
+    Some(frame.and_then(|frame| known.add_to(frame, stages)))
+}
+
+impl FolderKnowledge {
+    /// The frame with its boxes and its mask.
+    fn add_to(&self, frame: RgbdFrame, stages: &mut Stages) -> Result<RgbdFrame, Skip> {
+        let detections = self.boxes.as_ref().map(|boxes| self.boxes_at(boxes, frame.timestamp_ns));
+        let started = Instant::now();
+        let mask = match &self.masks {
+            Some(masks) => masks.at(frame.timestamp_ns)?,
+            None => None,
+        };
+        if self.masks.is_some() {
+            stages.push("decode mask", started.elapsed());
+        }
+        Ok(RgbdFrame { detections, mask, ..frame })
+    }
+
+    /// The boxes of the frame that is played at this time; none if the file does not list it.
+    fn boxes_at(&self, boxes: &KnownDetections, played_ns: i64) -> Vec<Detection> {
+        let recorded_ns = self.mirror.map_or(played_ns, |mirror| mirror.apply(played_ns));
+        boxes.get(&recorded_ns).cloned().unwrap_or_default()
+    }
+}
+
+/// The kind of fault, for counting.
+fn reason(fault: &FrameFault) -> &'static str {
+    match fault {
+        FrameFault::Unreadable(Error::Read { source, .. }) if source.kind() == ErrorKind::NotFound => "missing file",
+        FrameFault::Unreadable(_) => "unreadable file",
+        FrameFault::Image { source, .. } => match source {
+            DecodeError::UnknownFormat(_) | DecodeError::WrongKind { .. } => "wrong type of image",
+            DecodeError::WrongSize { .. } | DecodeError::TooLarge(_) => "wrong size of image",
+            DecodeError::Damaged(_) => "damaged image",
+        },
+        FrameFault::NoDepth { .. } => "no depth in any pixel",
+        FrameFault::DecoderStopped => "decoder stopped",
+    }
+}

@@ -1,0 +1,114 @@
+//! Maps that last: where a run's map comes from and where it goes, and on which thread it is made.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use yfslam::dense::Survey;
+use yfslam::dense::persist::decode as decode_pieces;
+use yfslam::map::persist::decode;
+use yfslam::packed::PIECES;
+use yfslam::{Execution, MapUse, Slam};
+use yfslam_io::write_atomically;
+
+use crate::run::pipeline::Pipeline;
+
+/// What a run does with maps.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Map")]
+pub struct MapArgs {
+    /// Begin in the map of an earlier run: it is extended once a place is recognised.
+    #[arg(long, value_name = "FILE")]
+    pub load_map: Option<PathBuf>,
+    /// Leave the loaded map as it is, and find the camera in it.
+    #[arg(long, requires = "load_map", conflicts_with = "save_map")]
+    pub localise: bool,
+    /// Write the map, for --load-map and, with --dense, for `yfslam map`. The file is written whole or not at all.
+    #[arg(long, value_name = "FILE")]
+    pub save_map: Option<PathBuf>,
+    /// Map on a thread of its own, as for a live camera: tracking never waits. Results then differ from run to run.
+    #[arg(long)]
+    pub threaded: bool,
+}
+
+impl MapArgs {
+    /// The options that ask for something a run of several methods cannot do: each method makes its own map, on its own thread.
+    pub fn of_one_method(&self) -> Vec<&'static str> {
+        let options = [
+            ("--load-map", self.load_map.is_some()),
+            ("--save-map", self.save_map.is_some()),
+            ("--threaded", self.threaded),
+        ];
+        options.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect()
+    }
+
+    /// On which thread maps are made.
+    pub fn execution(&self) -> Execution {
+        if self.threaded { Execution::Threaded } else { Execution::Inline }
+    }
+
+    /// A system that maps as was asked for.
+    ///
+    /// # Errors
+    /// The map cannot be read, is none, or was made with other settings or, to be extended, with another camera.
+    pub fn apply(&self, slam: Slam) -> Result<Slam> {
+        let slam = slam.with_execution(self.execution())?;
+        let Some(path) = &self.load_map else { return Ok(slam) };
+        let map_use = if self.localise { MapUse::Localise } else { MapUse::Extend };
+        let saved = decode(&read(path)?).with_context(|| format!("{} cannot be used as a map", path.display()))?;
+        slam.with_map(saved, map_use).with_context(|| format!("the map {} does not fit", path.display()))
+    }
+
+    /// Proves before a long run that the map can be written after it.
+    ///
+    /// # Errors
+    /// It cannot.
+    pub fn check(&self) -> Result<()> {
+        let Some(path) = &self.save_map else { return Ok(()) };
+        // A new file of another name: what stands at `path` stays until there is a map to take its place.
+        let mut probe = path.clone().into_os_string();
+        probe.push(".probe");
+        let probe = PathBuf::from(probe);
+        write_atomically(&probe, |_| Ok(()))
+            .with_context(|| format!("the map {} cannot be written", path.display()))?;
+        // Left behind it does no harm.
+        let _ = std::fs::remove_file(probe);
+        Ok(())
+    }
+
+    /// Writes the map if that was asked for, behind the dense pieces, if there are any.
+    ///
+    /// # Errors
+    /// The file cannot be written; what stood there stays.
+    pub fn save(&self, pipeline: &mut Pipeline, pieces: Option<&[u8]>) -> Result<()> {
+        let Some(path) = &self.save_map else { return Ok(()) };
+        let map = pipeline.save_map()?;
+        Ok(write_atomically(path, |file| {
+            file.write_all(pieces.unwrap_or_default()).and_then(|()| file.write_all(&map))
+        })?)
+    }
+
+    /// The dense pieces of the map that is extended, if it has any and this run makes more.
+    ///
+    /// # Errors
+    /// The map cannot be read, or is to be saved by a run that would leave them out.
+    pub fn pieces(&self, dense: bool) -> Result<Option<Survey>> {
+        let Some(path) = self.load_map.as_ref().filter(|_| !self.localise && (dense || self.save_map.is_some())) else {
+            return Ok(None);
+        };
+        let bytes = read(path)?;
+        if !PIECES.begins(&bytes) {
+            return Ok(None);
+        }
+        ensure!(
+            dense,
+            "{} holds dense pieces, which only a run with --dense carries on; add --dense, or leave out --save-map",
+            path.display()
+        );
+        decode_pieces(&bytes).map(Some).with_context(|| format!("{} cannot be used as a map", path.display()))
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).with_context(|| format!("the map {} cannot be read", path.display()))
+}

@@ -1,0 +1,7 @@
+//! SLAM on a sequence, and its evaluation.
+
+pub mod dense;
+pub mod evaluation;
+pub mod map_args;
+pub mod method_run;
+pub mod pipeline;

@@ -1,0 +1,262 @@
+//! Takes frames through SLAM and keeps what became of them.
+//!
+//! In: a configuration, a camera, frames. Out: an [`Outcome`]. No truth comes in here.
+
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use yfslam::config::DepthSource;
+use yfslam::geometry::Pose;
+use yfslam::tracking::TrackingState;
+use yfslam::{Config, RgbdFrame, Slam, Tracked};
+use yfslam_io::StampedPose;
+use yfslam_io::time::format_stamp;
+use yfslam_io::write::PlyPoint;
+
+use crate::input::detector::Took;
+use crate::stats::cpu;
+use crate::stats::recognition::PlaceTally;
+use crate::stats::skip::Skip;
+use crate::stats::stages::Stages;
+use crate::stats::tally::{DynamicTally, FrameTally};
+
+/// SLAM with a record of what happened.
+pub struct Pipeline {
+    slam: Slam,
+    /// Durations of all stages of all frames.
+    pub stages: Stages,
+    frames: FrameTally,
+    dynamic: DynamicTally,
+    places: PlaceTally,
+    live: Vec<StampedPose>,
+    resets: usize,
+    made_keyframe: bool,
+    detector_times: Option<Receiver<Took>>,
+    cpu: Option<Duration>,
+    started: Instant,
+    state: TrackingState,
+    /// Most features, and most of them with depth, in a frame before the map began.
+    best_start: (usize, usize),
+}
+
+/// What came out of a run.
+pub struct Outcome {
+    /// All tracked frames, as the map has them at the end.
+    pub trajectory: Vec<StampedPose>,
+    /// All tracked frames, as they were known at their time.
+    pub live: Vec<StampedPose>,
+    /// The keyframes of this run that are in the map at the end.
+    pub keyframes: Vec<StampedPose>,
+    /// The landmarks.
+    pub landmarks: Vec<PlyPoint>,
+    pub frames: FrameTally,
+    pub dynamic: DynamicTally,
+    pub places: PlaceTally,
+    pub stages: Stages,
+    /// From the first frame to the last.
+    pub wall: Duration,
+    /// Processor time of tracking and detection; `None` where the system does not tell.
+    pub cpu: Option<Duration>,
+}
+
+impl Pipeline {
+    /// A record of what `slam` will do; `detector_times` tell what its detector takes.
+    pub fn new(slam: Slam, detector_times: Option<Receiver<Took>>) -> Self {
+        Self {
+            slam,
+            stages: Stages::default(),
+            frames: FrameTally::default(),
+            dynamic: DynamicTally::default(),
+            places: PlaceTally::default(),
+            live: Vec::new(),
+            resets: 0,
+            made_keyframe: false,
+            detector_times,
+            cpu: cpu::thread_time().map(|_| Duration::ZERO),
+            started: Instant::now(),
+            state: TrackingState::default(),
+            best_start: (0, 0),
+        }
+    }
+
+    /// Takes one frame through SLAM; one that it refuses is counted as skipped. Returns the state after it.
+    pub fn track(&mut self, frame: &RgbdFrame) -> TrackingState {
+        let started = Instant::now();
+        let (result, cpu) = cpu::timed(|| self.slam.track(frame));
+        self.add_cpu(cpu);
+        self.made_keyframe = result.as_ref().is_ok_and(|tracked| tracked.is_keyframe);
+        let tracked = match result {
+            Ok(tracked) => tracked,
+            Err(rejected) => {
+                self.skip(Skip { reason: "refused by the tracker", message: rejected.to_string() });
+                return self.state;
+            }
+        };
+        self.log(&tracked);
+        self.stages.push("frame", started.elapsed());
+        self.note_times(&tracked);
+        self.frames.count(tracked.state);
+        self.dynamic.count(&self.slam);
+        self.places.count(&tracked);
+        if self.slam.resets() > self.resets {
+            // A new map is a new world: poses of the old one do not belong to this trajectory.
+            self.resets = self.slam.resets();
+            self.live.clear();
+            self.frames.restart();
+        }
+        if let Some(pose) = tracked.t_world_cam {
+            self.live.push(StampedPose { timestamp_ns: tracked.timestamp_ns, pose });
+        } else if self.frames.tracked == 0 {
+            self.note_start();
+        }
+        tracked.state
+    }
+
+    /// Counts a frame that cannot be used.
+    pub fn skip(&mut self, skip: Skip) {
+        tracing::info!("skipped {}", skip.message);
+        self.frames.skip(skip);
+    }
+
+    /// The system as the last frame left it.
+    pub fn slam(&self) -> &Slam {
+        &self.slam
+    }
+
+    /// Whether the last frame became a keyframe.
+    pub fn made_keyframe(&self) -> bool {
+        self.made_keyframe
+    }
+
+    /// What became of the frames so far.
+    pub fn frames(&self) -> &FrameTally {
+        &self.frames
+    }
+
+    fn log(&mut self, tracked: &Tracked) {
+        let (frame, time) = (self.frames.total(), format_stamp(tracked.timestamp_ns));
+        if tracked.state != self.state {
+            tracing::info!(frame, %time, before = ?self.state, now = ?tracked.state, "state");
+            self.state = tracked.state;
+        }
+        tracing::debug!(frame, %time, inliers = tracked.inliers, keyframe = tracked.is_keyframe, "frame");
+    }
+
+    fn note_times(&mut self, tracked: &Tracked) {
+        let times = &tracked.times;
+        self.stages.push("features", times.features);
+        let detections: Vec<_> = self.detector_times.iter().flat_map(Receiver::try_iter).collect();
+        for took in detections {
+            self.stages.push("detector", took.wall);
+            self.add_cpu(took.cpu);
+        }
+        if self.detector_times.is_some() {
+            self.stages.push("detector wait", times.detector_wait);
+        }
+        self.stages.push("dynamic filter", times.dynamic);
+        self.stages.push("tracking", times.tracking);
+        if !times.places.is_zero() {
+            self.stages.push("places", times.places);
+        }
+        if !times.mapping.is_zero() {
+            self.stages.push("mapping", times.mapping);
+        }
+    }
+
+    fn add_cpu(&mut self, took: Option<Duration>) {
+        self.cpu = self.cpu.zip(took).map(|(sum, took)| sum + took);
+    }
+
+    fn note_start(&mut self) {
+        let features = &self.slam.last_frame().features.features;
+        let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
+        self.best_start = self.best_start.max((features.len(), with_depth));
+    }
+
+    /// The map as bytes, for a later run.
+    ///
+    /// # Errors
+    /// It cannot be written, which would be a fault of this program.
+    pub fn save_map(&mut self) -> Result<Vec<u8>> {
+        self.settle();
+        Ok(self.slam.save_map()?)
+    }
+
+    /// Waits for mapping that is under way.
+    pub fn settle(&mut self) {
+        if let (Some(closed), Some(last)) = (self.slam.settle(), self.live.last()) {
+            self.places.close(last.timestamp_ns, &closed);
+        }
+    }
+
+    /// Ends the run.
+    ///
+    /// # Errors
+    /// No frame was tracked; the message says why.
+    pub fn finish(mut self, config: &Config) -> Result<Outcome> {
+        self.settle();
+        self.places.keyframes_passed_over = self.slam.passed_over();
+        let of_submaps: Vec<usize> = self.slam.trajectories().iter().map(Vec::len).collect();
+        self.places.frames_apart = of_submaps.iter().sum::<usize>() - of_submaps.iter().max().copied().unwrap_or(0);
+        let wall = self.started.elapsed();
+        self.frames.detector_failures = self.slam.detector_failures();
+        if self.frames.tracked == 0 {
+            self.fail(config)?;
+        }
+        let map = self.slam.map();
+        let of_this_run = map.keyframes().filter(|(_, k)| k.sequence >= self.slam.first_keyframe());
+        let mut keyframes: Vec<_> = of_this_run.map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
+        keyframes.sort_by_key(|&(sequence, ..)| sequence);
+        let landmark =
+            |l: &yfslam::map::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
+        Ok(Outcome {
+            trajectory: self.slam.trajectory().into_iter().map(stamped).collect(),
+            live: self.live,
+            keyframes: keyframes.into_iter().map(|(_, t, t_cam_world)| stamped((t, t_cam_world.inverse()))).collect(),
+            landmarks: map.landmarks().map(|(_, l)| landmark(l)).collect(),
+            frames: self.frames,
+            dynamic: self.dynamic,
+            places: self.places,
+            stages: self.stages,
+            wall,
+            cpu: self.cpu,
+        })
+    }
+
+    /// Why there is no trajectory.
+    fn fail(&self, config: &Config) -> Result<()> {
+        let FrameTally { read, skipped, first_skipped, .. } = &self.frames;
+        if *read == 0 {
+            let first = first_skipped.as_deref().unwrap_or("the sequence has no frames");
+            bail!("no trajectory: none of the {skipped} frames can be used; the first: {first}");
+        }
+        let (features, with_depth) = self.best_start;
+        if config.depth.source == DepthSource::Motion {
+            bail!(
+                "no trajectory: no map could be begun in {read} frames ({skipped} skipped); the best had {features} features. Without depth \
+                 it takes two frames with {} matches between which the camera has moved aside, not only turned; move it sideways, or \
+                 lower the keys start_* of section monocular in --config",
+                config.monocular.start_min_matches
+            );
+        }
+        bail!(
+            "no trajectory: no map could be begun in {read} frames ({skipped} skipped); the best had {features} features, \
+             {with_depth} of them static and with depth, but tracking.init_min_features asks for {} and \
+             tracking.init_min_landmarks for {}; check camera and depth factor with `yfslam info`, or lower these in --config",
+            config.tracking.init_min_features,
+            config.tracking.init_min_landmarks
+        );
+    }
+}
+
+fn stamped((timestamp_ns, pose): (i64, Pose)) -> StampedPose {
+    StampedPose { timestamp_ns, pose }
+}
+
+impl Outcome {
+    /// Frames per second, from the first frame to the last, of everything together.
+    pub fn fps(&self) -> f64 {
+        self.frames.total() as f64 / self.wall.as_secs_f64().max(1e-9)
+    }
+}

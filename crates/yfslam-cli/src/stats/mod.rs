@@ -1,0 +1,7 @@
+//! Figures of a run: counts, durations, processor time.
+
+pub mod cpu;
+pub mod recognition;
+pub mod skip;
+pub mod stages;
+pub mod tally;
