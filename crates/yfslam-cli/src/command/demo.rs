@@ -8,7 +8,7 @@ use clap::{Args, value_parser};
 
 use super::run::{self, RunArgs};
 use crate::input::settings::{MethodArg, describe};
-use crate::output::html::quote;
+use crate::ui::command_line::quote;
 use crate::ui::terminal::Terminal;
 
 const EXAMPLES: &str = "\

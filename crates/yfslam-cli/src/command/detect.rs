@@ -14,8 +14,7 @@ use yfslam_io::write::write_color_png;
 use crate::input::detector::{self, DetectorArgs, LoadedDetector};
 use crate::input::instance_detector::Apart;
 use crate::output::detections_file::{FoundBox, FoundIn, FoundList, Look};
-use crate::output::folder::OutputFolder;
-use crate::output::overlay;
+use crate::output::folder::{OutputFolder, remove_files};
 use crate::stats::stages::StageSummary;
 use crate::ui::progress::Progress;
 use crate::ui::terminal::{Terminal, explain};
@@ -176,7 +175,7 @@ fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
 fn pictures(out: &OutputFolder) -> Result<PathBuf> {
     let folder = out.path().join("pictures");
     let is_ours = |name: &str| name.ends_with(".png") && name.bytes().take_while(u8::is_ascii_digit).count() >= 6;
-    overlay::remove_pictures(&folder, is_ours)?;
+    remove_files(&folder, is_ours)?;
     Ok(folder)
 }
 

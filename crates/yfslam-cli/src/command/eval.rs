@@ -10,7 +10,8 @@ use yfslam_eval::{
     Delta, EvalOptions, Evaluation, RpeOptions, Statistics, Table, TableStyle, evaluate, improvement_percent,
 };
 
-use crate::run::evaluation::{MatchArgs, judge, read_poses, to_eval};
+use crate::input::trajectory::read_poses;
+use crate::run::evaluation::{EvaluationArgs, evaluate_possible};
 use crate::ui::terminal::{Terminal, print};
 
 const EXAMPLES: &str = "\
@@ -35,7 +36,7 @@ pub struct EvalArgs {
     #[arg(long, value_name = "OTHER")]
     versus: Option<PathBuf>,
     #[command(flatten)]
-    matching: MatchArgs,
+    evaluation: EvaluationArgs,
     /// Span of the relative error: frames (1f), seconds (1s) or metres (0.5m); may be given several times [default: 1f 1s].
     #[arg(long, value_name = "SPAN", help_heading = "Evaluation")]
     delta: Vec<Span>,
@@ -98,21 +99,21 @@ struct Improvement {
 }
 
 pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
-    let truth = to_eval(&read_poses(&args.groundtruth, terminal)?);
-    let max_diff_ns = args.matching.max_diff_ns()?;
-    let judged = |path: &Path| -> Result<Evaluation> {
-        let estimate = to_eval(&read_poses(path, terminal)?);
+    let truth = read_poses(&args.groundtruth, terminal)?;
+    let max_diff_ns = args.evaluation.max_diff_ns()?;
+    let evaluated = |path: &Path| -> Result<Evaluation> {
+        let estimate = read_poses(path, terminal)?;
         let options = options(args, max_diff_ns);
         // A span that was asked for must be there; a default one may be missing.
         let evaluation = if args.delta.is_empty() {
-            judge(&truth, &estimate, options)
+            evaluate_possible(&truth, &estimate, options)
         } else {
             evaluate(&truth, &estimate, &options)
         };
-        evaluation.with_context(|| format!("cannot judge {} by {}", path.display(), args.groundtruth.display()))
+        evaluation.with_context(|| format!("cannot evaluate {} against {}", path.display(), args.groundtruth.display()))
     };
-    let estimate = judged(&args.estimate)?;
-    let versus = args.versus.as_deref().map(judged).transpose()?;
+    let estimate = evaluated(&args.estimate)?;
+    let versus = args.versus.as_deref().map(evaluated).transpose()?;
     let improvement_percent = versus.as_ref().map(|versus| improvements(&estimate, versus));
     let comparison = Comparison { estimate, versus, improvement_percent };
     if args.json {
@@ -123,7 +124,7 @@ pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
 
 /// What to measure.
 fn options(args: &EvalArgs, max_diff_ns: u64) -> EvalOptions {
-    let mut options = EvalOptions { max_diff_ns, alignment: args.matching.alignment(true), ..Default::default() };
+    let mut options = EvalOptions { max_diff_ns, alignment: args.evaluation.alignment(true), ..Default::default() };
     if !args.delta.is_empty() {
         options.rpe = args.delta.iter().map(|span| span.options()).collect();
     }

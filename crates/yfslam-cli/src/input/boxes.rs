@@ -4,21 +4,15 @@
 //! with their boxes, found once.
 
 use std::fmt;
-use std::sync::Arc;
-use std::sync::mpsc::Receiver;
-use std::time::Duration;
 
 use anyhow::{Result, bail};
 use serde::Serialize;
+use yfslam::Config;
 use yfslam::dynamic::Method;
-use yfslam::image::Image;
-use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError, Upright, mask_of_classes};
 
-use crate::input::detector::{self, DetectorArgs, LoadedDetector, ModelIdentity, Took};
+use crate::input::detector::{self, DetectorArgs, LoadedDetector, ModelIdentity};
 use crate::input::settings::describe;
 use crate::input::source::SourceArgs;
-use crate::stats::cpu;
-use crate::stats::stages::Stages;
 use crate::ui::terminal::Terminal;
 
 /// Where the boxes of movable objects come from.
@@ -93,119 +87,4 @@ pub fn choose(
         terminal.note("no --detector: people are found by the network in this program");
     }
     Ok((BoxOrigin::Detector(loaded.identity.clone()), Some(loaded)))
-}
-
-/// A detector that sees each frame once, for several methods; where these disagree on how far the camera is rolled, once each.
-pub struct SharedDetector {
-    detector: Box<dyn Detector>,
-    upright: Upright,
-    times: Receiver<Took>,
-    /// Indices of the classes that can move.
-    movable: Vec<usize>,
-    /// What was found in the current frame, with a camera rolled by so many degrees; `None` if no boxes are due.
-    found: Option<Vec<(i32, Found)>>,
-    /// As `dynamic.detect_every`.
-    every: usize,
-    /// Frames that no method refuses for their time, and the time of the last of them, ns.
-    frames: usize,
-    last_ns: Option<i64>,
-    tally: DetectionTally,
-}
-
-/// What can move in a frame.
-#[derive(Clone, Debug, Default)]
-struct Found {
-    boxes: Vec<Detection>,
-    /// From a detector that segments.
-    mask: Option<Arc<Image<u8>>>,
-}
-
-/// What it took to find boxes for several methods at once.
-#[derive(Clone, Debug)]
-pub struct DetectionTally {
-    pub stages: Stages,
-    /// Processor time; `None` where the system does not tell.
-    pub cpu: Option<Duration>,
-    /// Frames on which the detector failed; they count as frames without boxes.
-    pub failures: usize,
-}
-
-impl Default for DetectionTally {
-    fn default() -> Self {
-        Self { stages: Stages::default(), cpu: cpu::thread_time().map(|_| Duration::ZERO), failures: 0 }
-    }
-}
-
-impl SharedDetector {
-    /// Takes over a detector that is to report the classes of `dynamic.movable`.
-    ///
-    /// # Errors
-    /// It does not know one of them.
-    pub fn new(LoadedDetector { detector, times, .. }: LoadedDetector, config: &Config) -> Result<Self, SetupError> {
-        let known = detector.class_names();
-        let index = |name: &String| {
-            let unknown = || SetupError::UnknownClass { name: name.clone(), known: known.join(", ") };
-            known.iter().position(|k| k == name).ok_or_else(unknown)
-        };
-        let movable = config.dynamic.movable.iter().map(index).collect::<Result<_, _>>()?;
-        Ok(Self {
-            detector,
-            upright: Upright::default(),
-            times,
-            movable,
-            found: None,
-            every: config.dynamic.detect_every,
-            frames: 0,
-            last_ns: None,
-            tally: DetectionTally::default(),
-        })
-    }
-
-    /// Comes to the next frame.
-    pub fn begin(&mut self, frame: &RgbdFrame) {
-        let refused = self.last_ns.is_some_and(|last_ns| last_ns >= frame.timestamp_ns);
-        let due = !refused && self.frames.is_multiple_of(self.every);
-        self.found = due.then(Vec::new);
-        if !refused {
-            self.last_ns = Some(frame.timestamp_ns);
-            self.frames += 1;
-        }
-    }
-
-    /// The frame with its boxes, or with none where none are due, for a method that knows its camera rolled by `roll_deg`.
-    pub fn see(&mut self, frame: &RgbdFrame, roll_deg: i32) -> RgbdFrame {
-        let Found { boxes, mask } = match &self.found {
-            None => Found::default(),
-            Some(found) => match found.iter().find(|(roll, _)| *roll == roll_deg) {
-                Some((_, found)) => found.clone(),
-                None => self.look(frame, roll_deg),
-            },
-        };
-        RgbdFrame { detections: Some(boxes), mask: frame.mask.clone().or(mask), ..frame.clone() }
-    }
-
-    fn look(&mut self, frame: &RgbdFrame, roll_deg: i32) -> Found {
-        let mut boxes = Vec::new();
-        if let Err(error) = self.upright.detect(&mut *self.detector, &frame.color, roll_deg, &mut boxes) {
-            tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");
-            boxes.clear();
-            self.tally.failures += 1;
-        }
-        boxes.retain(|detection| self.movable.contains(&detection.class));
-        let mask = self.upright.mask(&*self.detector).map(|mask| Arc::new(mask_of_classes(mask, &self.movable)));
-        for took in self.times.try_iter() {
-            self.tally.stages.push("detector", took.wall);
-            self.tally.cpu = self.tally.cpu.zip(took.cpu).map(|(sum, took)| sum + took);
-        }
-        let found = Found { boxes, mask };
-        if let Some(earlier) = &mut self.found {
-            earlier.push((roll_deg, found.clone()));
-        }
-        found
-    }
-
-    /// What it took.
-    pub fn into_tally(self) -> DetectionTally {
-        self.tally
-    }
 }

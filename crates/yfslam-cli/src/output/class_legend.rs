@@ -8,12 +8,7 @@ use serde::Serialize;
 use yfslam::dense::Volume;
 use yfslam::dense::classes::Classes;
 
-/// Colour of free space in octrees.
-pub const FREE: [u8; 3] = [255; 3];
-/// Colour of what has no class.
-const UNKNOWN: [u8; 3] = [150; 3];
-/// From one class to the next, in parts of the circle of hues: the golden angle keeps any few of them apart.
-const HUE_STEP: f32 = 0.381_966;
+use crate::draw::colors::class_color;
 
 /// The classes that occur, and how often.
 #[derive(Clone, Debug, Serialize)]
@@ -33,21 +28,6 @@ struct Entry {
     voxels: usize,
 }
 
-/// The colour of a class; grey for 0.
-pub fn color_of(class: u8) -> [u8; 3] {
-    if class == 0 {
-        return UNKNOWN;
-    }
-    let hue = (f32::from(class) * HUE_STEP).fract() * 6.0;
-    // Every third class is darker, so that near hues differ in light.
-    let value = [255.0, 215.0, 165.0][usize::from(class) % 3];
-    let channel = |at: f32| {
-        let ramp = ((hue - at).rem_euclid(6.0) - 3.0).abs() - 1.0;
-        (value * (0.2 + 0.8 * ramp.clamp(0.0, 1.0))) as u8
-    };
-    [channel(0.0), channel(2.0), channel(4.0)]
-}
-
 impl ClassLegend {
     /// Counts the occupied voxels of each class; `names` from class 1 on.
     pub fn of(names: &[String], volume: &Volume, classes: &Classes) -> Self {
@@ -58,7 +38,7 @@ impl ClassLegend {
         let entry = |(class, name): (u8, &String)| Entry {
             class,
             name: name.clone(),
-            color: color_of(class),
+            color: class_color(class),
             voxels: counts[usize::from(class)],
         };
         let mut found: Vec<Entry> = named.map(entry).collect();
@@ -73,21 +53,5 @@ impl fmt::Display for ClassLegend {
         let known: Vec<String> = self.classes.iter().map(named).collect();
         let known = if known.is_empty() { "none found".to_owned() } else { known.join(", ") };
         writeln!(f, "classes, in voxels: {known}; {} unknown", self.unknown)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_two_classes_of_coco_look_alike() {
-        let colors: Vec<[u8; 3]> = (0..=80).map(color_of).collect();
-        for (i, a) in colors.iter().enumerate() {
-            for b in &colors[..i] {
-                let apart: u32 = a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b))).sum();
-                assert!(apart >= 8, "{i}: {a:?} and {b:?}");
-            }
-        }
     }
 }

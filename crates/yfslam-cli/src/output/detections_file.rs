@@ -9,9 +9,9 @@ use yfslam::Detection;
 use yfslam::image::{Image, RgbImage};
 use yfslam_io::write_atomically;
 
+use super::rle::Runs;
 use crate::draw::shapes::{Color, bar, rectangle, stain};
 use crate::input::detector::ModelIdentity;
-use crate::output::rle::Runs;
 
 /// Colours of the classes, in their order; then they repeat.
 const COLORS: [Color; 6] =

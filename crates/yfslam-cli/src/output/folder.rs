@@ -1,4 +1,4 @@
-//! The folder that a run leaves behind; every file is written whole or not at all.
+//! The output folder of a command; every file is written whole or not at all.
 
 use std::path::{Path, PathBuf};
 
@@ -7,12 +7,12 @@ use yfslam::Config;
 use yfslam_io::write::write_ply;
 use yfslam_io::{write_atomically, write_trajectory};
 
-use crate::output::report::Report;
+use super::report::RunReport;
 use crate::run::pipeline::Outcome;
 
-/// Folder for the folders of runs whose `--out` is left out.
+/// Parent of the output folders of runs without `--out`.
 const DEFAULT_PARENT: &str = "yfslam-out";
-/// Why one method of several has no result.
+/// The file that says why one method of several has no result.
 pub const FAILURE_FILE: &str = "failure.txt";
 
 /// A folder that can be written to.
@@ -20,27 +20,27 @@ pub const FAILURE_FILE: &str = "failure.txt";
 pub struct OutputFolder(PathBuf);
 
 impl OutputFolder {
-    /// Makes the folder `out`, or else one named after the sequence, and proves that files can be written there.
+    /// Creates the folder `out`, or else one named after the sequence, and checks that files can be written there.
     ///
     /// # Errors
-    /// It cannot be written to: better known before a long run than after.
+    /// The folder cannot be written to.
     pub fn prepare(out: Option<&Path>, name: &str) -> Result<Self> {
         let folder = out.map_or_else(|| Path::new(DEFAULT_PARENT).join(name), PathBuf::from);
         let probe = folder.join(".yfslam-probe");
         write_atomically(&probe, |_| Ok(()))
             .with_context(|| format!("the output folder {} cannot be used", folder.display()))?;
-        // Left behind it does no harm.
+        // A probe that stays does no harm.
         let _ = std::fs::remove_file(&probe);
         Ok(Self(folder))
     }
 
-    /// A folder in it for one method of several, without word of an earlier failure.
+    /// Creates a folder in it for one method of several, and removes the failure of an earlier run.
     ///
     /// # Errors
     /// As [`OutputFolder::prepare`].
-    pub fn of_method(&self, name: &str) -> Result<Self> {
+    pub fn for_method(&self, name: &str) -> Result<Self> {
         let folder = Self::prepare(Some(&self.0.join(name)), name)?;
-        // None is there, or it is overwritten if there is a new one.
+        // The file may not exist; if it cannot be removed, a new failure overwrites it.
         let _ = std::fs::remove_file(folder.0.join(FAILURE_FILE));
         Ok(folder)
     }
@@ -53,11 +53,11 @@ impl OutputFolder {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write_failure(&self, why: &str) -> Result<()> {
-        Ok(write_atomically(&self.0.join(FAILURE_FILE), |file| writeln!(file, "{why}"))?)
+    pub fn write_failure(&self, reason: &str) -> Result<()> {
+        Ok(write_atomically(&self.0.join(FAILURE_FILE), |file| writeln!(file, "{reason}"))?)
     }
 
-    /// Writes everything but the report.
+    /// Writes trajectories, landmarks and configuration.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -74,8 +74,22 @@ impl OutputFolder {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write_report(&self, report: &Report) -> Result<()> {
+    pub fn write_report(&self, report: &RunReport) -> Result<()> {
         let json = serde_json::to_string_pretty(report)?;
         Ok(write_atomically(&self.0.join("run.json"), |file| writeln!(file, "{json}"))?)
     }
+}
+
+/// Removes the files of an earlier run, recognised by their names, from a folder that need not exist.
+///
+/// # Errors
+/// A file cannot be removed.
+pub fn remove_files(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Result<()> {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        if is_ours(&entry.file_name().to_string_lossy()) {
+            let path = entry.path();
+            std::fs::remove_file(&path).with_context(|| format!("cannot remove the old {}", path.display()))?;
+        }
+    }
+    Ok(())
 }

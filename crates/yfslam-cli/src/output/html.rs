@@ -1,6 +1,6 @@
-//! Gathers what `report.html` shows.
+//! Collects the content of `report.html`.
 //!
-//! In: the runs of one or more methods on one sequence. Out: the page beside their files.
+//! In: the runs of one or more methods on one sequence. Out: the page in the output folder.
 
 use std::path::PathBuf;
 
@@ -9,32 +9,33 @@ use yfslam_eval::StampedPose;
 use yfslam_eval::report::{Frames, MethodReport, Report, Stage, Times};
 use yfslam_io::write_atomically;
 
+use super::folder::OutputFolder;
+use super::report::ReportedRun;
 use crate::input::boxes::BoxOrigin;
 use crate::input::settings::describe;
-use crate::output::folder::OutputFolder;
-use crate::output::report::Run;
-use crate::run::evaluation::to_eval;
-use crate::run::method_run::Judged;
-use crate::stats::stages::Stages;
+use crate::input::trajectory::to_eval;
+use crate::run::method_run::RunResult;
+use crate::stats::stages::{StageSummary, Stages};
+use crate::ui::command_line::command_line;
 
 /// Writes `report.html` into the folder and returns its path; `shared` are stages that all runs have in common. Runs must be of the
 /// same sequence; the first is what the others are compared with.
 ///
 /// # Errors
 /// The file cannot be written, or a configuration cannot be.
-pub fn write(out: &OutputFolder, runs: &[Run], shared: &Stages) -> Result<PathBuf> {
+pub fn write(out: &OutputFolder, runs: &[ReportedRun], shared: &Stages) -> Result<PathBuf> {
     let path = out.path().join("report.html");
     let html = page(runs, shared)?;
     write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
     Ok(path)
 }
 
-fn page(runs: &[Run], shared: &Stages) -> Result<String> {
-    let Some(first @ Run { source, truth, .. }) = runs.first() else { return Ok(String::new()) };
-    let trajectories: Vec<Vec<StampedPose>> = runs.iter().map(|r| to_eval(&r.judged.outcome.trajectory)).collect();
-    let boxes = runs.iter().map(|run| run.judged.boxes).find(|boxes| !matches!(boxes, BoxOrigin::None));
-    let wall_s = runs.iter().map(|r| r.judged.outcome.wall.as_secs_f64()).fold(0.0, f64::max);
-    let methods = runs.iter().zip(&trajectories).map(|(run, trajectory)| method(run.judged, trajectory));
+fn page(runs: &[ReportedRun], shared: &Stages) -> Result<String> {
+    let Some(first @ ReportedRun { source, truth, .. }) = runs.first() else { return Ok(String::new()) };
+    let trajectories: Vec<Vec<StampedPose>> = runs.iter().map(|r| to_eval(&r.result.outcome.trajectory)).collect();
+    let boxes = runs.iter().map(|run| run.result.boxes).find(|boxes| !matches!(boxes, BoxOrigin::None));
+    let wall_s = runs.iter().map(|r| r.result.outcome.wall.as_secs_f64()).fold(0.0, f64::max);
+    let methods = runs.iter().zip(&trajectories).map(|(run, trajectory)| method(run, trajectory));
     let report = Report {
         sequence: &source.name,
         facts: facts(first, boxes.unwrap_or(&BoxOrigin::None)),
@@ -49,15 +50,16 @@ fn page(runs: &[Run], shared: &Stages) -> Result<String> {
     Ok(report.html())
 }
 
-fn method<'a>(judged: &'a Judged, trajectory: &'a [StampedPose]) -> Result<MethodReport<'a>> {
-    let Judged { outcome, config, pictures, dense, .. } = judged;
+fn method<'a>(run: &ReportedRun<'a>, trajectory: &'a [StampedPose]) -> Result<MethodReport<'a>> {
+    let ReportedRun { result, images, .. } = *run;
+    let RunResult { outcome, config, .. } = result;
     let (name, summary) = describe(config.dynamic.method);
     let tally = &outcome.frames;
     Ok(MethodReport {
         name,
         summary,
         trajectory,
-        evaluation: judged.evaluation(),
+        evaluation: result.evaluation(),
         frames: Frames {
             total: tally.total(),
             tracked: tally.tracked,
@@ -69,14 +71,14 @@ fn method<'a>(judged: &'a Judged, trajectory: &'a [StampedPose]) -> Result<Metho
             tracking_s: outcome.stages.total("frame").as_secs_f64(),
             cpu_s: outcome.cpu.map(|cpu| cpu.as_secs_f64()),
         },
-        pictures: pictures.clone(),
-        dense: dense.clone(),
+        pictures: images.snapshots.clone(),
+        dense: images.dense.clone(),
         config: config.to_commented_toml()?,
     })
 }
 
 fn stages(stages: &Stages) -> Vec<Stage> {
-    let stage = |(name, s): (&str, crate::stats::stages::StageSummary)| Stage {
+    let stage = |(name, s): (&str, StageSummary)| Stage {
         name: name.to_owned(),
         count: s.count,
         median_ms: s.median_ms,
@@ -86,7 +88,7 @@ fn stages(stages: &Stages) -> Vec<Stage> {
 }
 
 /// What there is to know about the sequence, as name and value.
-fn facts(run: &Run, boxes: &BoxOrigin) -> Vec<(&'static str, String)> {
+fn facts(run: &ReportedRun, boxes: &BoxOrigin) -> Vec<(&'static str, String)> {
     let (camera, stamps) = (&run.source.camera, &run.source.stamps_ns);
     let seconds = match (stamps.first(), stamps.last()) {
         (Some(first), Some(last)) => last.saturating_sub(*first) as f64 / 1e9,
@@ -105,33 +107,4 @@ fn facts(run: &Run, boxes: &BoxOrigin) -> Vec<(&'static str, String)> {
         ("Boxes", boxes.to_string()),
         ("Ground truth", run.truth.map_or("none".to_owned(), |truth| truth.origin.clone())),
     ]
-}
-
-/// The command that was given, ready to be given again.
-pub fn command_line() -> String {
-    let arguments = std::env::args_os().skip(1).map(|argument| quote(&argument.to_string_lossy()));
-    ["yfslam".to_owned()].into_iter().chain(arguments).collect::<Vec<_>>().join(" ")
-}
-
-/// A word as a shell takes it.
-pub fn quote(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_word_that_a_shell_would_change_is_quoted() {
-        assert_eq!(quote("a/b-c.onnx"), "a/b-c.onnx");
-        assert_eq!(quote("synth:x?a=1&b"), "'synth:x?a=1&b'");
-        assert_eq!(quote("it's"), "'it'\\''s'");
-        assert_eq!(quote(""), "''");
-    }
 }

@@ -1,11 +1,13 @@
 //! What a command leaves behind: folders, files, reports, summaries.
 
 pub mod class_legend;
+pub mod dense;
 pub mod detections_file;
 pub mod folder;
 pub mod html;
-pub mod overlay;
+mod overlay;
+pub mod recorder;
 pub mod report;
 pub mod rle;
-pub mod snapshots;
+mod snapshots;
 pub mod summary;

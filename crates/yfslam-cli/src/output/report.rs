@@ -1,4 +1,4 @@
-//! What `run.json` says about a run.
+//! The content of `run.json`.
 
 use serde::Serialize;
 use yfslam::{Camera, Config};
@@ -6,28 +6,30 @@ use yfslam_eval::Evaluation;
 use yfslam_io::Fault;
 use yfslam_io::sequence::AssociationReport;
 
+use super::recorder::ReportImages;
 use crate::input::boxes::BoxOrigin;
 use crate::input::source::{MaskTally, Source, Truth};
 use crate::run::dense::DenseCost;
-use crate::run::method_run::Judged;
-use crate::stats::recognition::PlaceTally;
+use crate::run::method_run::RunResult;
+use crate::stats::recognition::RecognitionTally;
 use crate::stats::stages::Stages;
 use crate::stats::tally::{DynamicTally, FrameTally};
 
-/// What a report is made of.
+/// One method run as the reports need it.
 #[derive(Clone, Copy)]
-pub struct Run<'a> {
+pub struct ReportedRun<'a> {
     /// As the user named it.
     pub sequence: &'a str,
     pub source: &'a Source,
     pub faults: &'a [Fault],
     pub truth: Option<&'a Truth>,
-    pub judged: &'a Judged<'a>,
+    pub result: &'a RunResult<'a>,
+    pub images: &'a ReportImages,
 }
 
-/// Everything that `run.json` says.
+/// The content of `run.json`.
 #[derive(Serialize)]
-pub struct Report<'a> {
+pub struct RunReport<'a> {
     /// Version of this program.
     pub yfslam: &'static str,
     pub sequence: &'a str,
@@ -40,13 +42,13 @@ pub struct Report<'a> {
     /// Faults put into the frames on purpose.
     pub faults: Vec<String>,
     pub frames: &'a FrameTally,
-    /// What was left out when colour and depth images were paired.
+    /// The association of colour images with depth or right images; `null` for synthetic worlds.
     pub association: Option<Association>,
     pub dynamic: &'a DynamicTally,
-    /// Loops that were closed, and stretches over which the camera was lost.
-    pub places: &'a PlaceTally,
+    /// Loops that were closed, and periods in which the camera was lost.
+    pub loops_and_relocalisation: &'a RecognitionTally,
     pub map: MapSize,
-    /// What the dense map took; `null` if none was made.
+    /// Cost of the dense map; `null` if none was made.
     pub dense: Option<DenseCost>,
     /// Wall time of each stage over all frames; `mapping` over keyframes. Decoding runs beside all; `detector` runs beside `features`
     /// or, if the frames are taken through several methods, once for all of them.
@@ -71,24 +73,24 @@ pub struct MapSize {
     pub landmarks: usize,
 }
 
-/// What was left out when colour and depth images were paired.
+/// The association of colour images with depth or right images.
 #[derive(Serialize)]
 pub struct Association {
     pub color_listed: usize,
-    pub companions_listed: usize,
-    pub paired: usize,
+    pub paired_images_listed: usize,
+    pub pairs: usize,
     pub color_unmatched: usize,
-    pub companions_unmatched: usize,
+    pub paired_images_unmatched: usize,
     pub duplicate_stamps_skipped: usize,
     pub backward_stamps_skipped: usize,
     pub unstamped_skipped: usize,
 }
 
-impl<'a> Report<'a> {
-    /// The report of one run.
-    pub fn new(run: &Run<'a>) -> Self {
-        let Run { sequence, source, faults, truth, judged } = *run;
-        let Judged { config, outcome, boxes, shared, .. } = judged;
+impl<'a> RunReport<'a> {
+    /// Builds the report of one method run.
+    pub fn new(run: &ReportedRun<'a>) -> Self {
+        let ReportedRun { sequence, source, faults, truth, result, .. } = *run;
+        let RunResult { config, outcome, boxes, shared, .. } = result;
         Self {
             yfslam: env!("CARGO_PKG_VERSION"),
             sequence,
@@ -100,16 +102,16 @@ impl<'a> Report<'a> {
             frames: &outcome.frames,
             association: source.association.as_ref().map(Association::from),
             dynamic: &outcome.dynamic,
-            places: &outcome.places,
+            loops_and_relocalisation: &outcome.recognition,
             map: MapSize { keyframes: outcome.keyframes.len(), landmarks: outcome.landmarks.len() },
-            dense: judged.dense_cost,
+            dense: result.dense_cost,
             times: shared.and(&outcome.stages),
             wall_s: outcome.wall.as_secs_f64(),
             fps: outcome.fps(),
             cpu_s: outcome.cpu.map(|cpu| cpu.as_secs_f64()),
             peak_memory_mb: peak_memory_mb(),
             groundtruth: truth.map(|truth| truth.origin.as_str()),
-            evaluation: judged.evaluation(),
+            evaluation: result.evaluation(),
             config,
         }
     }
@@ -119,10 +121,10 @@ impl From<&AssociationReport> for Association {
     fn from(report: &AssociationReport) -> Self {
         Self {
             color_listed: report.color_listed,
-            companions_listed: report.companions_listed,
-            paired: report.paired,
+            paired_images_listed: report.companions_listed,
+            pairs: report.paired,
             color_unmatched: report.color_unmatched,
-            companions_unmatched: report.companions_unmatched,
+            paired_images_unmatched: report.companions_unmatched,
             duplicate_stamps_skipped: report.duplicates_skipped,
             backward_stamps_skipped: report.backward_skipped,
             unstamped_skipped: report.unstamped_skipped,
@@ -130,7 +132,7 @@ impl From<&AssociationReport> for Association {
     }
 }
 
-/// Peak resident memory of this process, MB (10⁶ bytes); `None` where the system does not tell.
+/// Returns the peak resident memory of this process, MB (10⁶ bytes); `None` where the system does not report it.
 fn peak_memory_mb() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

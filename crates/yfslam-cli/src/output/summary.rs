@@ -1,20 +1,20 @@
-//! What a run tells at its end, on the terminal: one method in words, several as a table.
+//! The summary of a run on the terminal: of one method in sentences, of several as a table.
 
 use std::fmt::Write;
 
 use anyhow::Result;
 use yfslam_eval::{AlignmentKind, Table, TableStyle, improvement_percent};
 
+use super::report::{ReportedRun, RunReport};
 use crate::input::boxes::BoxOrigin;
 use crate::input::settings::describe;
 use crate::input::source::{Source, Truth};
-use crate::output::report::{Report, Run};
-use crate::run::method_run::Judged;
-use crate::stats::recognition::{Loop, PlaceTally};
+use crate::run::method_run::RunResult;
+use crate::stats::recognition::{Loop, RecognitionTally};
 
-/// What became of the frames of one method, in a few lines.
-pub fn of_one(report: &Report, run: &Run) -> Result<String> {
-    let Run { source, judged: Judged { outcome, .. }, .. } = run;
+/// Summarises the run of one method in a few lines.
+pub fn of_one(report: &RunReport, run: &ReportedRun) -> Result<String> {
+    let ReportedRun { source, result: RunResult { outcome, .. }, .. } = run;
     let frames = &outcome.frames;
     let mut text = format!(
         "{}: tracked {} of {} frames ({:.1} %), lost {}, skipped {}; {:.1} frames a second\n",
@@ -53,7 +53,7 @@ pub fn of_one(report: &Report, run: &Run) -> Result<String> {
             frames.detector_failures
         )?;
     }
-    places_summary(&mut text, &outcome.places)?;
+    write_recognition(&mut text, &outcome.recognition)?;
     write!(text, "map: {} keyframes, {} landmarks", report.map.keyframes, report.map.landmarks)?;
     if let Some(peak) = report.peak_memory_mb {
         write!(text, "; peak memory {peak:.0} MB")?;
@@ -61,47 +61,52 @@ pub fn of_one(report: &Report, run: &Run) -> Result<String> {
     Ok(text + "\n")
 }
 
-fn places_summary(text: &mut String, places: &PlaceTally) -> Result<()> {
-    let joins = places.loops.iter().filter(|l| l.merged_submaps).count();
-    // A single camera has a unit of its own, which drifts.
+fn write_recognition(text: &mut String, recognition: &RecognitionTally) -> Result<()> {
+    let merges = recognition.loops.iter().filter(|l| l.merged_submaps).count();
+    // The scale of a single camera drifts.
     let drift = |l: &Loop| {
         let scale =
             if l.drift_scale == 1.0 { " m".to_owned() } else { format!(" and a scale of {:.2}", l.drift_scale) };
         format!("{:.2}{scale}", l.drift_m)
     };
-    let drifts: Vec<_> = places.loops.iter().filter(|l| !l.merged_submaps).map(drift).collect();
+    let drifts: Vec<_> = recognition.loops.iter().filter(|l| !l.merged_submaps).map(drift).collect();
     if !drifts.is_empty() {
         writeln!(text, "loops closed: {}, after a drift of {}", drifts.len(), drifts.join(", "))?;
     }
-    if joins > 0 {
-        writeln!(text, "submaps joined: {joins}")?;
+    if merges > 0 {
+        writeln!(text, "submaps merged: {merges}")?;
     }
-    if let Some(longest) = places.lost.iter().map(|stretch| stretch.frames).max() {
-        let found = places.lost.iter().filter(|stretch| stretch.found_again).count();
-        writeln!(text, "lost {} times, found again {found} times; for {longest} frames at most", places.lost.len())?;
+    if let Some(longest) = recognition.lost.iter().map(|period| period.frames).max() {
+        let relocalised = recognition.lost.iter().filter(|period| period.relocalised).count();
+        writeln!(
+            text,
+            "lost {} times, relocalised {relocalised} times; lost for {longest} frames at most",
+            recognition.lost.len()
+        )?;
     }
     Ok(())
 }
 
-/// The errors side by side, as in Table 2 of the paper.
-pub fn of_several(judged: &[Judged], source: &Source, truth: Option<&Truth>) -> String {
-    let kind = judged.iter().find_map(Judged::evaluation).map_or(AlignmentKind::Se3, |e| e.ate.alignment.kind);
+/// Summarises the errors of several methods as a table, as in Table 2 of the paper.
+pub fn of_several(results: &[&RunResult], source: &Source, truth: Option<&Truth>) -> String {
+    let kind =
+        results.iter().find_map(|result| result.evaluation()).map_or(AlignmentKind::Se3, |e| e.ate.alignment.kind);
     let ate = format!("ATE, {kind} (m)");
     let headers =
         [ate.as_str(), "RMSE", "S.D.", "mean", "median", "max", "improve RMSE (%)", "S.D. (%)", "frames tracked"];
     let mut table = Table::new(headers);
-    let errors_of = |judged: &Judged| judged.evaluation().map(|e| e.ate.translation_m);
-    let original = judged.first().and_then(errors_of);
-    for (place, one) in judged.iter().enumerate() {
-        let Judged { config, outcome, .. } = one;
+    let errors_of = |result: &&RunResult| result.evaluation().map(|e| e.ate.translation_m);
+    let original = results.first().and_then(errors_of);
+    for (index, result) in results.iter().enumerate() {
+        let RunResult { config, outcome, .. } = result;
         let (name, summary) = describe(config.dynamic.method);
-        let errors = errors_of(one);
+        let errors = errors_of(result);
         let figures = match errors {
             Some(s) => [s.rmse, s.std, s.mean, s.median, s.max].map(|v| format!("{v:.4}")),
             None => std::array::from_fn(|_| "-".to_owned()),
         };
         let improvement = match errors.zip(original) {
-            Some((ours, original)) if place > 0 => {
+            Some((ours, original)) if index > 0 => {
                 [(ours.rmse, original.rmse), (ours.std, original.std)].map(|(ours, original)| {
                     improvement_percent(ours, original).map_or("-".to_owned(), |percent| format!("{percent:.2}"))
                 })
@@ -111,7 +116,7 @@ pub fn of_several(judged: &[Judged], source: &Source, truth: Option<&Truth>) -> 
         let tracked = format!("{} of {}", outcome.frames.tracked, outcome.frames.total());
         table.push([format!("{name}: {summary}")].into_iter().chain(figures).chain(improvement).chain([tracked]));
     }
-    let boxes = judged.iter().map(|one| one.boxes).find(|boxes| !matches!(boxes, BoxOrigin::None));
+    let boxes = results.iter().map(|result| result.boxes).find(|boxes| !matches!(boxes, BoxOrigin::None));
     let truth = truth.map_or("none", |truth| truth.origin.as_str());
     format!(
         "{}; boxes: {}; ground truth: {truth}\n\n{}",

@@ -1,19 +1,19 @@
-//! Maps that last: where a run's map comes from and where it goes, and on which thread it is made.
+//! Saved maps: where a run's map comes from, where it is saved, and on which thread mapping runs.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use yfslam::dense::Survey;
-use yfslam::dense::persist::decode as decode_pieces;
+use yfslam::dense::persist::decode as decode_dense;
 use yfslam::map::persist::decode;
 use yfslam::packed::PIECES;
 use yfslam::{Execution, MapUse, Slam};
 use yfslam_io::write_atomically;
 
-use crate::run::pipeline::Pipeline;
+use super::pipeline::Pipeline;
 
-/// What a run does with maps.
+/// Where a run's map comes from, where it is saved, and how it is made.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Map")]
 pub struct MapArgs {
@@ -76,36 +76,35 @@ impl MapArgs {
         Ok(())
     }
 
-    /// Writes the map if that was asked for, behind the dense pieces, if there are any.
+    /// Writes the map if that was asked for, behind the dense map, if there is one.
     ///
     /// # Errors
-    /// The file cannot be written; what stood there stays.
-    pub fn save(&self, pipeline: &mut Pipeline, pieces: Option<&[u8]>) -> Result<()> {
+    /// The file cannot be written; an earlier file then stays.
+    pub fn save(&self, pipeline: &mut Pipeline, dense: Option<&[u8]>) -> Result<()> {
         let Some(path) = &self.save_map else { return Ok(()) };
         let map = pipeline.save_map()?;
         Ok(write_atomically(path, |file| {
-            file.write_all(pieces.unwrap_or_default()).and_then(|()| file.write_all(&map))
+            file.write_all(dense.unwrap_or_default()).and_then(|()| file.write_all(&map))
         })?)
     }
 
-    /// The dense pieces of the map that is extended, if it has any and this run makes more.
+    /// Returns the dense map in the file whose map is extended, if it has one and this run continues it.
     ///
     /// # Errors
-    /// The map cannot be read, or is to be saved by a run that would leave them out.
-    pub fn pieces(&self, dense: bool) -> Result<Option<Survey>> {
-        let Some(path) = self.load_map.as_ref().filter(|_| !self.localise && (dense || self.save_map.is_some())) else {
-            return Ok(None);
-        };
+    /// The file cannot be read, or is to be saved by a run that would leave its dense map out.
+    pub fn dense_map(&self, makes_dense_map: bool) -> Result<Option<Survey>> {
+        let is_continued = !self.localise && (makes_dense_map || self.save_map.is_some());
+        let Some(path) = self.load_map.as_ref().filter(|_| is_continued) else { return Ok(None) };
         let bytes = read(path)?;
         if !PIECES.begins(&bytes) {
             return Ok(None);
         }
         ensure!(
-            dense,
-            "{} holds dense pieces, which only a run with --dense carries on; add --dense, or leave out --save-map",
+            makes_dense_map,
+            "{} holds a dense map, which only a run with --dense continues; add --dense, or leave out --save-map",
             path.display()
         );
-        decode_pieces(&bytes).map(Some).with_context(|| format!("{} cannot be used as a map", path.display()))
+        decode_dense(&bytes).map(Some).with_context(|| format!("{} cannot be used as a map", path.display()))
     }
 }
 

@@ -1,184 +1,127 @@
-//! One method at work on a sequence, and what came of it.
+//! One method on one sequence.
 //!
-//! In: frames, which several lanes may share. Out: a [`Judged`] run, its files written.
+//! In: frames, which several methods may share. Out: a [`RunResult`].
 
 use anyhow::Result;
-use yfslam::dense::persist::encode;
 use yfslam::tracking::TrackingState;
 use yfslam::{Config, Detector, RgbdFrame, Slam};
-use yfslam_eval::report::{DenseMap, Picture};
 use yfslam_eval::{AlignmentKind, EvalError, EvalOptions, Evaluation, ExpectedFrames};
 
-use crate::input::boxes::{BoxOrigin, DetectionTally};
+use super::dense::{DenseCost, DenseResult, DenseRun};
+use super::evaluation::evaluate_possible;
+use super::map_args::MapArgs;
+use super::pipeline::{Outcome, Pipeline};
+use super::shared_detector::DetectionTally;
+use crate::input::boxes::BoxOrigin;
 use crate::input::detector::LoadedDetector;
 use crate::input::source::{Source, Truth};
-use crate::output::folder::OutputFolder;
-use crate::output::overlay::Overlay;
-use crate::output::snapshots::Moments;
-use crate::run::dense::{self, DenseCost, DenseRun};
-use crate::run::evaluation::{judge, to_eval};
-use crate::run::map_args::MapArgs;
-use crate::run::pipeline::{Outcome, Pipeline};
+use crate::input::trajectory::to_eval;
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
 
-/// A method at work.
-pub struct Lane {
+/// One method at work.
+pub struct MethodRun {
     pub config: Config,
-    pub folder: OutputFolder,
     pub pipeline: Pipeline,
     pub state: TrackingState,
-    overlay: Option<Overlay>,
-    moments: Option<Moments>,
     dense: Option<DenseRun>,
-    /// What ended it early.
-    failure: Option<anyhow::Error>,
 }
 
-/// What a lane is to leave behind besides its trajectory.
+/// What a run is evaluated with.
 #[derive(Clone, Copy)]
-pub struct Extras<'a> {
-    /// A picture of every frame.
-    pub overlay: bool,
-    /// Evenly spread moments of which the report has a picture; `None` without a report.
-    pub moments: Option<usize>,
-    /// A dense map.
-    pub dense: bool,
-    pub map: &'a MapArgs,
-}
-
-/// What a run is judged by.
-#[derive(Clone, Copy)]
-pub struct Judge<'a> {
+pub struct EvalContext<'a> {
     pub source: &'a Source,
     pub truth: Option<&'a Truth>,
     pub max_diff_ns: u64,
     pub alignment: AlignmentKind,
-    /// Where the boxes come from, for methods that need any.
+    /// Where the boxes come from, for methods that need them.
     pub boxes: &'a BoxOrigin,
-    /// What reading the frames took.
+    /// Durations of reading the frames.
     pub reading: &'a Stages,
-    /// What detection took that was done for several lanes.
+    /// Cost of detection that several methods share.
     pub detection: &'a DetectionTally,
 }
 
-/// What came of a method.
-pub struct Judged<'a> {
+/// The result of one method.
+pub struct RunResult<'a> {
     pub config: Config,
-    pub folder: OutputFolder,
     pub outcome: Outcome,
     /// Where its boxes come from.
     pub boxes: &'a BoxOrigin,
-    /// Stages that were not its own: reading, and detection for several.
+    /// Stages that several methods share: reading, and detection.
     pub shared: Stages,
     /// `None` without ground truth.
     pub evaluation: Option<Result<Evaluation, EvalError>>,
-    pub pictures: Vec<Picture>,
-    /// Its dense map in pictures, for the report.
-    pub dense: Option<DenseMap>,
     pub dense_cost: Option<DenseCost>,
 }
 
-impl Lane {
-    /// A method that is ready for the frames of `source`, with a detector of its own if it is alone.
+impl MethodRun {
+    /// Prepares a method for the frames of `source`, with a detector of its own if it is the only method.
     ///
     /// # Errors
-    /// The configuration, the detector or a map cannot be used, or pictures of an earlier run cannot be removed.
+    /// The configuration, the detector or a map cannot be used.
     pub fn prepare(
         config: Config,
         source: &Source,
-        folder: OutputFolder,
         detector: Option<LoadedDetector>,
-        extras: Extras,
+        makes_dense_map: bool,
+        map: &MapArgs,
     ) -> Result<Self> {
-        let open_score = config.dynamic.open_score;
-        let overlay = extras.overlay.then(|| Overlay::prepare(folder.path(), open_score)).transpose()?;
-        let moments = extras.moments.map(|count| Moments::new(source.stamps_ns.len(), count, open_score));
         let (detector, times) = detector.map(|d| (d.detector as Box<dyn Detector>, d.times)).unzip();
-        let earlier = extras.map.pieces(extras.dense)?;
-        let slam = extras.map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
+        let earlier = map.dense_map(makes_dense_map)?;
+        let slam = map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
         let pipeline = Pipeline::new(slam, times);
-        let (camera, execution) = (&source.camera.camera, extras.map.execution());
-        let dense = extras
-            .dense
+        let (camera, execution) = (&source.camera.camera, map.execution());
+        let dense = makes_dense_map
             .then(|| DenseRun::new(&config.dense, camera, execution, earlier, pipeline.slam()))
             .transpose()?;
-        Ok(Self { config, folder, pipeline, overlay, moments, dense, state: TrackingState::default(), failure: None })
+        Ok(Self { config, pipeline, dense, state: TrackingState::default() })
     }
 
-    /// Takes one frame through the pipeline.
-    pub fn take(&mut self, frame: &Result<RgbdFrame, Skip>) {
+    /// Tracks one frame, or counts one that cannot be used.
+    pub fn process(&mut self, frame: &Result<RgbdFrame, Skip>) {
         match frame {
-            _ if self.failure.is_some() => {}
             Ok(frame) => {
                 self.state = self.pipeline.track(frame);
-                self.failure = self.picture(frame).err();
                 if let Some(dense) = &mut self.dense {
-                    dense.see(frame, &mut self.pipeline);
+                    dense.insert(frame, &mut self.pipeline);
                 }
             }
             Err(skip) => self.pipeline.skip(skip.clone()),
         }
     }
 
-    fn picture(&mut self, frame: &RgbdFrame) -> Result<()> {
-        let index = self.pipeline.frames().total() - 1;
-        if let Some(moments) = &mut self.moments {
-            moments.see(index, frame, self.pipeline.slam());
-        }
-        match &self.overlay {
-            Some(overlay) => overlay.write(index, frame, self.pipeline.slam()),
-            None => Ok(()),
-        }
-    }
-
-    /// Whether it ended early.
-    pub fn has_failed(&self) -> bool {
-        self.failure.is_some()
-    }
-
-    /// Ends the run and judges it.
+    /// Ends the run, saves its map if that was asked for, and evaluates it. Returns the dense map beside the result.
     ///
     /// # Errors
-    /// What ended it early, or why there is no trajectory; a file cannot be written.
-    pub fn finish<'a>(self, judge_by: Judge<'a>, map: &MapArgs) -> Result<Judged<'a>> {
-        let Self { config, folder, mut pipeline, moments, dense, failure, .. } = self;
-        if let Some(failure) = failure {
-            return Err(failure);
-        }
+    /// There is no trajectory, with the reason, or the map cannot be written.
+    pub fn finish<'a>(self, context: EvalContext<'a>, map: &MapArgs) -> Result<(RunResult<'a>, Option<DenseResult>)> {
+        let Self { config, mut pipeline, dense, .. } = self;
         let dense_cost = dense.as_ref().map(DenseRun::cost);
-        let survey = dense.map(|dense| dense.finish(&mut pipeline));
-        let pieces = survey.as_ref().map(encode).transpose()?;
-        map.save(&mut pipeline, pieces.as_deref())?;
+        let dense = dense.map(|dense| DenseResult::new(dense.finish(&mut pipeline))).transpose()?;
+        map.save(&mut pipeline, dense.as_ref().map(|dense| dense.encoded.as_slice()))?;
         let mut outcome = pipeline.finish(&config)?;
-        let mut shared = judge_by.reading.clone();
+        let mut shared = context.reading.clone();
         let needs_boxes = config.dynamic.method.needs_boxes();
         if needs_boxes {
-            let DetectionTally { stages, cpu, failures } = judge_by.detection;
+            let DetectionTally { stages, cpu, failures } = context.detection;
             shared = shared.and(stages);
             outcome.cpu = outcome.cpu.zip(*cpu).map(|(own, shared)| own + shared);
             outcome.frames.detector_failures += failures;
         }
-        let evaluation = judge_by.truth.map(|truth| {
-            let expected = ExpectedFrames::StampsNs(judge_by.source.stamps_ns.clone());
-            let Judge { max_diff_ns, alignment, .. } = judge_by;
+        let evaluation = context.truth.map(|truth| {
+            let expected = ExpectedFrames::StampsNs(context.source.stamps_ns.clone());
+            let EvalContext { max_diff_ns, alignment, .. } = context;
             let options = EvalOptions { max_diff_ns, alignment, expected, ..Default::default() };
-            judge(&truth.poses, &to_eval(&outcome.trajectory), options)
+            evaluate_possible(&truth.poses, &to_eval(&outcome.trajectory), options)
         });
-        folder.write(&outcome, &config)?;
-        if let Some(pieces) = &pieces {
-            dense::write(folder.path(), pieces)?;
-        }
-        let shown = survey.filter(|_| moments.is_some());
-        let dense = shown.map(|survey| dense::pictures(&config.dense, &survey)).transpose()?;
-        let pictures = moments.map_or(Ok(Vec::new()), |moments| moments.to_pictures())?;
-        let boxes = if needs_boxes { judge_by.boxes } else { &BoxOrigin::None };
-        Ok(Judged { config, folder, outcome, boxes, shared, evaluation, pictures, dense, dense_cost })
+        let boxes = if needs_boxes { context.boxes } else { &BoxOrigin::None };
+        Ok((RunResult { config, outcome, boxes, shared, evaluation, dense_cost }, dense))
     }
 }
 
-impl Judged<'_> {
-    /// The errors, if they are known.
+impl RunResult<'_> {
+    /// Returns the errors, if they are known.
     pub fn evaluation(&self) -> Option<&Evaluation> {
         self.evaluation.as_ref()?.as_ref().ok()
     }

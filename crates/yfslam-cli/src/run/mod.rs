@@ -5,3 +5,4 @@ pub mod evaluation;
 pub mod map_args;
 pub mod method_run;
 pub mod pipeline;
+pub mod shared_detector;

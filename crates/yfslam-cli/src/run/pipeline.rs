@@ -16,7 +16,7 @@ use yfslam_io::write::PlyPoint;
 
 use crate::input::detector::Took;
 use crate::stats::cpu;
-use crate::stats::recognition::PlaceTally;
+use crate::stats::recognition::RecognitionTally;
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
 use crate::stats::tally::{DynamicTally, FrameTally};
@@ -28,7 +28,7 @@ pub struct Pipeline {
     pub stages: Stages,
     frames: FrameTally,
     dynamic: DynamicTally,
-    places: PlaceTally,
+    recognition: RecognitionTally,
     live: Vec<StampedPose>,
     resets: usize,
     made_keyframe: bool,
@@ -52,7 +52,7 @@ pub struct Outcome {
     pub landmarks: Vec<PlyPoint>,
     pub frames: FrameTally,
     pub dynamic: DynamicTally,
-    pub places: PlaceTally,
+    pub recognition: RecognitionTally,
     pub stages: Stages,
     /// From the first frame to the last.
     pub wall: Duration,
@@ -68,7 +68,7 @@ impl Pipeline {
             stages: Stages::default(),
             frames: FrameTally::default(),
             dynamic: DynamicTally::default(),
-            places: PlaceTally::default(),
+            recognition: RecognitionTally::default(),
             live: Vec::new(),
             resets: 0,
             made_keyframe: false,
@@ -98,7 +98,7 @@ impl Pipeline {
         self.note_times(&tracked);
         self.frames.count(tracked.state);
         self.dynamic.count(&self.slam);
-        self.places.count(&tracked);
+        self.recognition.count(&tracked);
         if self.slam.resets() > self.resets {
             // A new map is a new world: poses of the old one do not belong to this trajectory.
             self.resets = self.slam.resets();
@@ -152,12 +152,12 @@ impl Pipeline {
             self.add_cpu(took.cpu);
         }
         if self.detector_times.is_some() {
-            self.stages.push("detector wait", times.detector_wait);
+            self.stages.push("detector idle", times.detector_wait);
         }
         self.stages.push("dynamic filter", times.dynamic);
         self.stages.push("tracking", times.tracking);
         if !times.places.is_zero() {
-            self.stages.push("places", times.places);
+            self.stages.push("relocalisation and loops", times.places);
         }
         if !times.mapping.is_zero() {
             self.stages.push("mapping", times.mapping);
@@ -186,7 +186,7 @@ impl Pipeline {
     /// Waits for mapping that is under way.
     pub fn settle(&mut self) {
         if let (Some(closed), Some(last)) = (self.slam.settle(), self.live.last()) {
-            self.places.close(last.timestamp_ns, &closed);
+            self.recognition.close(last.timestamp_ns, &closed);
         }
     }
 
@@ -196,9 +196,10 @@ impl Pipeline {
     /// No frame was tracked; the message says why.
     pub fn finish(mut self, config: &Config) -> Result<Outcome> {
         self.settle();
-        self.places.keyframes_passed_over = self.slam.passed_over();
+        self.recognition.keyframes_dropped = self.slam.passed_over();
         let of_submaps: Vec<usize> = self.slam.trajectories().iter().map(Vec::len).collect();
-        self.places.frames_apart = of_submaps.iter().sum::<usize>() - of_submaps.iter().max().copied().unwrap_or(0);
+        self.recognition.frames_in_other_submaps =
+            of_submaps.iter().sum::<usize>() - of_submaps.iter().max().copied().unwrap_or(0);
         let wall = self.started.elapsed();
         self.frames.detector_failures = self.slam.detector_failures();
         if self.frames.tracked == 0 {
@@ -217,7 +218,7 @@ impl Pipeline {
             landmarks: map.landmarks().map(|(_, l)| landmark(l)).collect(),
             frames: self.frames,
             dynamic: self.dynamic,
-            places: self.places,
+            recognition: self.recognition,
             stages: self.stages,
             wall,
             cpu: self.cpu,

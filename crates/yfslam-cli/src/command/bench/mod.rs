@@ -20,7 +20,7 @@ use self::paper::sections;
 use self::runner::Bench;
 use self::table::csv;
 use crate::output::folder::OutputFolder;
-use crate::output::html::command_line;
+use crate::ui::command_line::command_line;
 use crate::ui::progress::Progress;
 use crate::ui::terminal::Terminal;
 

@@ -20,10 +20,11 @@ use yfslam_io::write::{
 };
 use yfslam_io::write_atomically;
 
+use crate::draw::colors::{FREE, class_color};
 use crate::draw::dense_image::{SHOWN_M, from_above, from_corner};
 use crate::input::settings::SettingsArgs;
-use crate::output::class_legend::{ClassLegend, FREE, color_of};
-use crate::run::dense::DENSE_FILE;
+use crate::output::class_legend::ClassLegend;
+use crate::output::dense::DENSE_FILE;
 use crate::stats::cpu;
 use crate::ui::progress::Progress;
 use crate::ui::terminal::Terminal;
@@ -253,7 +254,7 @@ impl Maker<'_> {
         let corner = from_corner(&points, resolution_m, cut_m, PICTURE_PX);
         write_color_png(&self.folder.join("corner.png"), &corner)?;
         if let Some(found) = found {
-            let by_class = |(point, class): (&CloudPoint, u8)| CloudPoint { color: color_of(class), ..*point };
+            let by_class = |(point, class): (&CloudPoint, u8)| CloudPoint { color: class_color(class), ..*point };
             let points: Vec<CloudPoint> = points.iter().zip(found).map(by_class).collect();
             let corner = from_corner(&points, resolution_m, cut_m, PICTURE_PX);
             write_color_png(&self.folder.join("classes.png"), &corner)?;
@@ -275,7 +276,7 @@ impl Maker<'_> {
         // As the user wrote it, not as a float of 32 bits has it.
         let resolution = (resolution * 1e6).round() / 1e6;
         let color = |v: &KnownVoxel| match &self.classes {
-            Some(classes) if v.occupied => color_of(classes.get(v.voxel)),
+            Some(classes) if v.occupied => class_color(classes.get(v.voxel)),
             _ => FREE,
         };
         let tree = |v: KnownVoxel| OctreeVoxel { voxel: v.voxel, log_odds: v.log_odds, color: color(&v) };

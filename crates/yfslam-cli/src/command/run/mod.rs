@@ -1,29 +1,31 @@
-//! `yfslam run`: a sequence in, its trajectory out; with several methods, one of each.
+//! `yfslam run`: tracks a sequence with one method or several.
+
+mod drive;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::{Args, Command, FromArgMatches};
+use yfslam::Config;
 use yfslam::config::DepthSource;
 use yfslam::dynamic::Method;
-use yfslam::{Config, RgbdFrame};
 use yfslam_eval::TableStyle;
 
-use crate::input::boxes::{self, DetectionTally, SharedDetector};
-use crate::input::detector::{DetectorArgs, LoadedDetector};
+use self::drive::{RecordedResult, Setup, drive, finish};
+use crate::input::boxes;
+use crate::input::detector::DetectorArgs;
 use crate::input::settings::{MethodArg, SettingsArgs, describe};
 use crate::input::source::{MaskTally, Source, SourceArgs, Truth};
 use crate::output::folder::OutputFolder;
 use crate::output::html;
-use crate::output::report::{Report, Run};
+use crate::output::recorder::RunOutputs;
+use crate::output::report::{ReportedRun, RunReport};
 use crate::output::summary;
-use crate::run::evaluation::MatchArgs;
+use crate::run::evaluation::EvaluationArgs;
 use crate::run::map_args::MapArgs;
-use crate::run::method_run::{Extras, Judge, Judged, Lane};
-use crate::stats::skip::Skip;
-use crate::stats::stages::Stages;
-use crate::ui::progress::Progress;
+use crate::run::method_run::{EvalContext, RunResult};
+use crate::run::shared_detector::{DetectionTally, SharedDetector};
 use crate::ui::terminal::{Terminal, explain};
 
 const EXAMPLES: &str = "\
@@ -61,10 +63,10 @@ failure.txt and does not stop the others.
 
 Ends with success only if a trajectory was produced, by one method at least.";
 
-/// Evenly spread moments of which the report has a picture.
-const MOMENTS: usize = 5;
+/// Evenly spread snapshots in the report of one method.
+const SNAPSHOTS: usize = 5;
 /// The same for each of several methods.
-const MOMENTS_OF_EACH: usize = 3;
+const SNAPSHOTS_OF_EACH: usize = 3;
 
 /// Track a sequence: its trajectory, map and report go to a folder.
 #[derive(Args, Debug)]
@@ -105,13 +107,13 @@ pub struct RunArgs {
     #[arg(long, value_name = "FILE", help_heading = "Evaluation")]
     groundtruth: Option<PathBuf>,
     #[command(flatten)]
-    matching: MatchArgs,
+    evaluation: EvaluationArgs,
 }
 
 pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let mut config = args.settings.resolve()?;
     let methods = args.methods(&config)?;
-    let max_diff_ns = args.matching.max_diff_ns()?;
+    let max_diff_ns = args.evaluation.max_diff_ns()?;
     let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
     let mut source = args.source.open(config.depth.source, boxes.is_source().then_some(&*config.dynamic.movable))?;
     config.depth.source = source.depth_source;
@@ -121,41 +123,48 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         source.name
     );
     if let Some(masks) = &source.masks {
-        tell(masks, terminal);
+        report_masks(masks, terminal);
     }
     let truth = find_truth(args, &source, terminal)?;
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
     args.map.check()?;
-    let (mut lanes, mut shared) = lanes(args, &config, &methods, &source, &out, detector)?;
-    let reading = drive(&mut source, shared.as_mut(), &mut lanes, terminal);
+    let snapshots = args.report.then_some(if methods.len() == 1 { SNAPSHOTS } else { SNAPSHOTS_OF_EACH });
+    let outputs = RunOutputs { overlay: args.overlay, snapshots };
+    let setup = Setup { source: &source, config: &config, map: &args.map, outputs, makes_dense_map: args.dense };
+    let (mut runs, mut shared) = setup.prepare(&methods, &out, detector)?;
+    let reading = drive(&mut source, shared.as_mut(), &mut runs, terminal);
 
     let detection = shared.map_or_else(DetectionTally::default, SharedDetector::into_tally);
     let (reading, truth) = (&reading, truth.as_ref());
-    let alignment = args.matching.alignment(config.depth.source != DepthSource::Motion);
-    let judge_by =
-        Judge { source: &source, truth, max_diff_ns, alignment, boxes: &boxes, reading, detection: &detection };
-    let judged = finish(args, lanes, judge_by, terminal)?;
-    let run =
-        |judged| Run { sequence: &args.source.sequence, source: &source, faults: &args.source.faults, truth, judged };
-    let runs: Vec<Run> = judged.iter().map(run).collect();
-    for run in &runs {
-        let report = Report::new(run);
-        run.judged.folder.write_report(&report)?;
+    let alignment = args.evaluation.alignment(config.depth.source != DepthSource::Motion);
+    let context =
+        EvalContext { source: &source, truth, max_diff_ns, alignment, boxes: &boxes, reading, detection: &detection };
+    let results = finish(runs, context, &args.map, terminal)?;
+    let (sequence, faults) = (args.source.sequence.as_str(), args.source.faults.as_slice());
+    let source = &source;
+    let runs: Vec<ReportedRun> = results
+        .iter()
+        .map(|RecordedResult { result, images, .. }| ReportedRun { sequence, source, faults, truth, result, images })
+        .collect();
+    for (run, RecordedResult { folder, .. }) in runs.iter().zip(&results) {
+        let report = RunReport::new(run);
+        folder.write_report(&report)?;
         if methods.len() == 1 {
             terminal.result(&summary::of_one(&report, run)?)?;
         }
     }
     let page = args.report.then(|| html::write(&out, &runs, &reading.and(&detection.stages))).transpose()?;
+    let results: Vec<&RunResult> = results.iter().map(|recorded| &recorded.result).collect();
     if methods.len() > 1 {
-        terminal.result(&summary::of_several(&judged, &source, truth))?;
-    } else if let Some(evaluation) = judged.first().and_then(Judged::evaluation) {
+        terminal.result(&summary::of_several(&results, source, truth))?;
+    } else if let Some(evaluation) = results.first().and_then(|result| result.evaluation()) {
         terminal.result(&format!("\n{}", evaluation.table(TableStyle::Plain)))?;
     }
     terminal.result(&format!("\nwritten to {}\n", out.path().display()))?;
     if let Some(page) = page {
         terminal.result(&format!("report: {}\n", page.display()))?;
     }
-    check_accuracy(args, &judged, terminal)
+    check_accuracy(args, &results, terminal)
 }
 
 impl RunArgs {
@@ -193,127 +202,37 @@ impl RunArgs {
     }
 }
 
-/// How many frames have a mask.
-fn tell(masks: &MaskTally, terminal: Terminal) {
+/// Reports how many frames have a mask.
+fn report_masks(masks: &MaskTally, terminal: Terminal) {
     let MaskTally { folder, found, missing, first_missing } = masks;
     terminal.note(&format!("{found} of {} frames have a mask in {}", found + missing, folder.display()));
     if let Some(first) = first_missing {
         terminal.warn(&format!(
-            "{missing} frames have no mask, and nothing is masked in them; the first: {}",
+            "{missing} frames have no mask, and nothing is masked in them; the first missing file is {}",
             first.display()
         ));
     }
 }
 
-/// One lane a method. A detector belongs to the only lane, or is shared.
-fn lanes(
-    args: &RunArgs,
-    config: &Config,
-    methods: &[Method],
-    source: &Source,
-    out: &OutputFolder,
-    detector: Option<LoadedDetector>,
-) -> Result<(Vec<Lane>, Option<SharedDetector>)> {
-    let alone = methods.len() == 1;
-    let moments = args.report.then_some(if alone { MOMENTS } else { MOMENTS_OF_EACH });
-    let extras = Extras { overlay: args.overlay, moments, dense: args.dense, map: &args.map };
-    let (mut own, shared) = if alone { (detector, None) } else { (None, detector) };
-    let lane = |method: &Method| {
-        let mut config = config.clone();
-        config.dynamic.method = *method;
-        let folder = if alone { out.clone() } else { out.of_method(describe(*method).0)? };
-        Lane::prepare(config, source, folder, own.take(), extras)
-    };
-    let lanes = methods.iter().map(lane).collect::<Result<_>>()?;
-    Ok((lanes, shared.map(|detector| SharedDetector::new(detector, config)).transpose()?))
-}
-
-/// A broken ground truth ends the run if it was asked for; one that merely lies in the folder is passed over.
+/// Reads the ground truth. A broken one is an error only if the user named it.
 fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Option<Truth>> {
     match source.truth(args.groundtruth.as_deref(), terminal) {
         Err(error) if args.groundtruth.is_none() => {
             terminal.warn(&format!("no evaluation: {}", explain(&error)));
             Ok(None)
         }
-        found => found.context("the ground truth cannot be used"),
+        truth => truth.context("the ground truth cannot be used"),
     }
 }
 
-/// Takes all frames of the source through all lanes, a thread for each. Returns what reading took.
-fn drive(
-    source: &mut Source,
-    mut detector: Option<&mut SharedDetector>,
-    lanes: &mut [Lane],
-    terminal: Terminal,
-) -> Stages {
-    let mut progress = Progress::new(terminal, &source.name, source.stamps_ns.len());
-    let mut reading = Stages::default();
-    while lanes.iter().any(|lane| !lane.has_failed())
-        && let Some(frame) = source.frames.next(&mut reading)
-    {
-        let given = hand_out(frame, detector.as_deref_mut(), lanes);
-        std::thread::scope(|scope| {
-            let mut work = lanes.iter_mut().zip(&given);
-            let first = work.next();
-            for (lane, frame) in work {
-                scope.spawn(|| lane.take(frame));
-            }
-            if let Some((lane, frame)) = first {
-                lane.take(frame);
-            }
-        });
-        if let Some(first) = lanes.first() {
-            progress.frame(first.pipeline.frames(), first.state);
-        }
-    }
-    progress.finish();
-    reading
-}
-
-/// The frame for each lane, with boxes from a detector that they share.
-fn hand_out(
-    frame: Result<RgbdFrame, Skip>,
-    detector: Option<&mut SharedDetector>,
-    lanes: &[Lane],
-) -> Vec<Result<RgbdFrame, Skip>> {
-    let (Some(detector), Ok(frame)) = (detector, &frame) else { return vec![frame; lanes.len()] };
-    detector.begin(frame);
-    let frame_for = |lane: &Lane| {
-        let needs_boxes = lane.config.dynamic.method.needs_boxes();
-        Ok(if needs_boxes { detector.see(frame, lane.pipeline.slam().roll_deg()) } else { frame.clone() })
-    };
-    lanes.iter().map(frame_for).collect()
-}
-
-/// The results of all lanes. One of several that has none is told of.
-fn finish<'a>(args: &RunArgs, lanes: Vec<Lane>, judge_by: Judge<'a>, terminal: Terminal) -> Result<Vec<Judged<'a>>> {
-    let alone = lanes.len() == 1;
-    let mut judged = Vec::new();
-    for lane in lanes {
-        let (folder, (name, _)) = (lane.folder.clone(), describe(lane.config.dynamic.method));
-        match lane.finish(judge_by, &args.map) {
-            Ok(one) => judged.push(one),
-            Err(error) if alone => return Err(error),
-            Err(error) => {
-                terminal.warn(&format!("{name}: {}", explain(&error)));
-                folder.write_failure(&explain(&error))?;
-            }
-        }
-    }
-    if judged.is_empty() {
-        bail!("no method has a trajectory");
-    }
-    Ok(judged)
-}
-
-/// That errors cannot be computed is an error if they were asked for.
-fn check_accuracy(args: &RunArgs, judged: &[Judged], terminal: Terminal) -> Result<()> {
-    for one in judged {
-        let Some(Err(error)) = &one.evaluation else { continue };
+/// Warns where errors cannot be computed; fails if the user named a ground truth.
+fn check_accuracy(args: &RunArgs, results: &[&RunResult], terminal: Terminal) -> Result<()> {
+    for result in results {
+        let Some(Err(error)) = &result.evaluation else { continue };
         if args.groundtruth.is_some() {
-            return Err(error.clone()).context("the trajectory was written, but it cannot be judged");
+            return Err(error.clone()).context("the trajectory was written, but it cannot be evaluated");
         }
-        let (name, _) = describe(one.config.dynamic.method);
+        let (name, _) = describe(result.config.dynamic.method);
         terminal.warn(&format!("{name}: no evaluation: {error}"));
     }
     Ok(())

@@ -20,7 +20,7 @@ use yfslam_io::trajectory::mirror_trajectory;
 use yfslam_io::{CameraSource, Delivery, Fault, FaultInjector, FrameStream, TrajectoryFile, load_camera};
 use yfslam_synth::{WorldConfig, default_camera, parse_with_camera};
 
-use crate::run::evaluation::{checked_poses, to_eval};
+use crate::input::trajectory::{checked_poses, to_eval};
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
 use crate::ui::terminal::Terminal;
