@@ -6,9 +6,8 @@ use std::str::FromStr;
 use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
-use yfslam_eval::{
-    Delta, EvalOptions, Evaluation, RpeOptions, Statistics, Table, TableStyle, evaluate, improvement_percent,
-};
+use yfslam_eval::{Delta, EvalOptions, Evaluation, RpeOptions, Statistics, evaluate, improvement_percent};
+use yfslam_report::{Table, TableStyle, evaluation_table};
 
 use crate::input::trajectory::read_poses;
 use crate::run::evaluation::{EvaluationArgs, evaluate_possible};
@@ -163,7 +162,7 @@ fn text(args: &EvalArgs, comparison: &Comparison) -> String {
     let (Some(other), Some(versus), Some(improvements)) =
         (&args.versus, &comparison.versus, &comparison.improvement_percent)
     else {
-        return comparison.estimate.table(TableStyle::Plain);
+        return evaluation_table(&comparison.estimate, TableStyle::Plain);
     };
     let mut table = Table::new(["improvement (%)", "RMSE", "mean", "median", "S.D."]);
     for i in improvements {
@@ -173,9 +172,9 @@ fn text(args: &EvalArgs, comparison: &Comparison) -> String {
     format!(
         "{}\n{}\n{}\n{}\nimprovement of the first over the second, (1 - ours / other) · 100\n{}",
         args.estimate.display(),
-        comparison.estimate.table(TableStyle::Plain),
+        evaluation_table(&comparison.estimate, TableStyle::Plain),
         other.display(),
-        versus.table(TableStyle::Plain),
+        evaluation_table(versus, TableStyle::Plain),
         table.render(TableStyle::Plain)
     )
 }

@@ -6,8 +6,8 @@ use anyhow::Result;
 use yfslam::dense::cloud::cloud;
 use yfslam::dense::{DenseConfig, Survey, up};
 use yfslam::image::RgbImage;
-use yfslam_eval::report::DenseMap;
 use yfslam_io::write_atomically;
+use yfslam_report::DenseMap;
 
 use crate::draw::dense_image::{SHOWN_M, from_above, from_corner};
 use crate::draw::indexed_png::to_png;

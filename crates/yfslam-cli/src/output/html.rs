@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use yfslam_eval::StampedPose;
-use yfslam_eval::report::{Frames, MethodReport, Report, Stage, Times};
 use yfslam_io::write_atomically;
+use yfslam_report::{Frames, MethodReport, Report, Stage, Times};
 
 use super::folder::OutputFolder;
 use super::report::ReportedRun;

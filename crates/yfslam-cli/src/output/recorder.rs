@@ -4,7 +4,7 @@
 
 use anyhow::Result;
 use yfslam::{Config, RgbdFrame, Slam};
-use yfslam_eval::report::{DenseMap, Picture};
+use yfslam_report::{DenseMap, Picture};
 
 use super::dense;
 use super::folder::OutputFolder;

@@ -6,7 +6,7 @@
 use anyhow::Result;
 use yfslam::image::RgbImage;
 use yfslam::{RgbdFrame, Slam};
-use yfslam_eval::report::Picture;
+use yfslam_report::Picture;
 
 use super::overlay::draw_frame;
 use crate::draw::indexed_png::to_png;

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use anyhow::Result;
-use yfslam_eval::{AlignmentKind, Table, TableStyle, improvement_percent};
+use yfslam_eval::{AlignmentKind, improvement_percent};
+use yfslam_report::{Table, TableStyle};
 
 use super::report::{ReportedRun, RunReport};
 use crate::input::boxes::BoxOrigin;

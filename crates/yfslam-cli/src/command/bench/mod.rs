@@ -11,9 +11,8 @@ use std::sync::Mutex;
 
 use anyhow::{Context, Result};
 use clap::{Args, value_parser};
-use yfslam_eval::TableStyle;
-use yfslam_eval::report::{TableSection, TablesPage};
 use yfslam_io::write_atomically;
+use yfslam_report::{TableSection, TableStyle, TablesPage};
 
 use self::cell::{Cell, Group};
 use self::paper::sections;

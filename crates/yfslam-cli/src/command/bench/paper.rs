@@ -3,8 +3,8 @@
 //!
 //! In: all cells. Out: tables with headings. What papers published stands beside a recorded sequence of the very name, if all of it was run.
 
-use yfslam_eval::report::{IMPROVEMENT, ORIGIN, PUBLISHED, TableSection};
-use yfslam_eval::{Measure, Statistics, Table, improvement_percent, published};
+use yfslam_eval::{Measure, Statistics, improvement_percent, published};
+use yfslam_report::{IMPROVEMENT, ORIGIN, PUBLISHED, Table, TableSection};
 
 use super::cell::Cell;
 use super::table::{Row, overview, rows, show};

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use yfslam_eval::{Statistics, Table};
+use yfslam_eval::Statistics;
+use yfslam_report::Table;
 
 use super::cell::Cell;
 
@@ -105,7 +106,7 @@ pub fn csv(cells: &[Cell]) -> String {
 
 #[cfg(test)]
 pub mod tests {
-    use yfslam_eval::TableStyle;
+    use yfslam_report::TableStyle;
 
     use super::*;
 

@@ -10,7 +10,7 @@ use clap::{Args, Command, FromArgMatches};
 use yfslam::Config;
 use yfslam::config::DepthSource;
 use yfslam::dynamic::Method;
-use yfslam_eval::TableStyle;
+use yfslam_report::{TableStyle, evaluation_table};
 
 use self::drive::{RecordedResult, Setup, drive, finish};
 use crate::input::boxes;
@@ -158,7 +158,7 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     if methods.len() > 1 {
         terminal.result(&summary::of_several(&results, source, truth))?;
     } else if let Some(evaluation) = results.first().and_then(|result| result.evaluation()) {
-        terminal.result(&format!("\n{}", evaluation.table(TableStyle::Plain)))?;
+        terminal.result(&format!("\n{}", evaluation_table(evaluation, TableStyle::Plain)))?;
     }
     terminal.result(&format!("\nwritten to {}\n", out.path().display()))?;
     if let Some(page) = page {

@@ -2,9 +2,9 @@
 
 use maud::{Markup, html};
 
-use super::ink::Ink;
 use super::page::shell;
-use crate::Table;
+use crate::figures::ink::Ink;
+use crate::table::Table;
 
 /// Word with which the last cell of a row begins whose figures were taken from a paper.
 pub const PUBLISHED: &str = "published";

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::axis::Axis;
-use super::figure::{Figure, Mark, height_for, plot_size};
 use super::ink::Ink;
 use super::path::Point;
+use super::plot::{Figure, Mark, height_for, plot_size};
 use super::scene::{Captioned, Scene, WIDTH, bounds};
 use super::series::At;
 

@@ -3,8 +3,8 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::orientation::{Mount, mean_turn};
-use super::{MethodReport, Report};
-use crate::{Alignment, Match, StampedPose, associate};
+use crate::content::{MethodReport, Report};
+use yfslam_eval::{Alignment, Match, StampedPose, associate};
 
 /// So many frames in a row without a pose count as a stretch: a frame that the sensor dropped is none.
 const SHORTEST_STRETCH: usize = 3;

@@ -4,15 +4,16 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::axis::length;
-use super::bars::bars;
 use super::dense::dense;
-use super::ink::{self, Ink};
-use super::over_time::over_time;
-use super::scene::{Captioned, Scene};
-use super::views::views;
-use super::{MethodReport, Picture, Report, tables};
-use crate::{AlignmentKind, improvement_percent};
+use super::tables;
+use crate::content::{MethodReport, Picture, Report};
+use crate::figures::axis::length;
+use crate::figures::bars::bars;
+use crate::figures::ink::{self, Ink};
+use crate::figures::over_time::over_time;
+use crate::figures::scene::{Captioned, Scene};
+use crate::figures::views::views;
+use yfslam_eval::{AlignmentKind, improvement_percent};
 
 /// The style sheet of all pages.
 const STYLE: &str = include_str!("style.css");

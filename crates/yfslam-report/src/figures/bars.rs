@@ -1,9 +1,9 @@
 //! In: errors of all methods. Out: bars of RMSE and S.D. (paper Fig. 6).
 
-use super::Report;
 use super::axis::Axis;
-use super::figure::{Figure, Mark};
+use super::plot::{Figure, Mark};
 use super::scene::{Captioned, LOG_FROM_RATIO, Scene, WIDTH, bounds};
+use crate::content::Report;
 
 const HEIGHT: f64 = 330.0;
 /// Width of a bar, as a share of the distance between two groups of bars.

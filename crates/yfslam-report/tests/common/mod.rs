@@ -2,8 +2,8 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 
 use nalgebra::{Isometry3, Vector3};
-use yfslam_eval::report::{Frames, MethodReport, Picture, Report, Stage, Times};
 use yfslam_eval::{Evaluation, StampedPose};
+use yfslam_report::{Frames, MethodReport, Picture, Report, Stage, Times};
 
 pub const FRAME_NS: i64 = 33_333_333;
 

@@ -5,9 +5,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, SymmetricEigen, UnitQuaternion};
 
-use super::Report;
-use crate::align::horn_matrix;
-use crate::{Match, StampedPose, associate};
+use crate::content::Report;
+use yfslam_eval::{Match, StampedPose, associate, horn_matrix};
 
 /// A turn of the followed frame is believed if it makes angles this many times smaller.
 const BELIEVED_FROM: f64 = 3.0;
@@ -21,7 +20,7 @@ pub struct Mount {
 impl Mount {
     /// As the most accurate method sees it; none without truth, or unless it explains most of the angles.
     pub fn of(report: &Report) -> Self {
-        let rmse = |m: &&super::MethodReport| m.evaluation.map_or(f64::INFINITY, |e| e.ate.translation_m.rmse);
+        let rmse = |m: &&crate::content::MethodReport| m.evaluation.map_or(f64::INFINITY, |e| e.ate.translation_m.rmse);
         let best = report.methods.iter().min_by(|a, b| rmse(a).total_cmp(&rmse(b)));
         let matches = match (report.truth, best.and_then(|best| Some((best, best.evaluation?)))) {
             (Some(truth), Some((best, evaluation))) => associate(truth, best.trajectory, evaluation.max_diff_ns),

@@ -1,4 +1,4 @@
-//! In: headers and cells. Out: an aligned table, as plain text for a terminal or as Markdown, or its cells as CSV.
+//! In: headers and cells. Out: the table as plain text for a terminal, as Markdown, as LaTeX or as CSV.
 
 /// How a table is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -8,18 +8,20 @@ pub enum TableStyle {
     Plain,
     /// GitHub Markdown, aligned in its source as well.
     Markdown,
+    /// A LaTeX `tabular` that needs no package.
+    Latex,
     /// Comma-separated values (RFC 4180): cells with a comma, a quote or a line break are quoted.
     Csv,
 }
 
-/// A table; its first column is aligned left, the others right.
+/// A table; its first column is left-aligned, the others are right-aligned.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    /// An empty table with the given column headers.
+    /// Creates an empty table with the given column headers.
     pub fn new<S: Into<String>>(headers: impl IntoIterator<Item = S>) -> Self {
         Self { rows: vec![headers.into_iter().map(Into::into).collect()] }
     }
@@ -29,12 +31,12 @@ impl Table {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// Headers, then rows.
+    /// Returns the headers, then the rows.
     pub fn rows(&self) -> &[Vec<String>] {
         &self.rows
     }
 
-    /// The table as text; each line ends with a newline and without trailing spaces.
+    /// Returns the table as text; each line ends with a newline and without trailing spaces.
     pub fn render(&self, style: TableStyle) -> String {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
         if style == TableStyle::Csv {
@@ -42,6 +44,9 @@ impl Table {
                 (0..columns).map(|c| quoted(row.get(c).map_or("", String::as_str))).collect::<Vec<_>>().join(",") + "\n"
             };
             return self.rows.iter().map(line).collect();
+        }
+        if style == TableStyle::Latex {
+            return self.latex(columns);
         }
         let cell = |row: &[String], column: usize| match row.get(column) {
             // A bar would end the Markdown cell.
@@ -74,9 +79,39 @@ impl Table {
         }
         text
     }
+
+    fn latex(&self, columns: usize) -> String {
+        let line = |row: &Vec<String>| {
+            let cells: Vec<_> = (0..columns).map(|c| latex_text(row.get(c).map_or("", String::as_str))).collect();
+            cells.join(" & ") + " \\\\\n"
+        };
+        let mut lines = self.rows.iter().map(line);
+        let headers = lines.next().unwrap_or_default();
+        let alignment = "l".to_owned() + &"r".repeat(columns.saturating_sub(1));
+        let rows: String = lines.collect();
+        format!("\\begin{{tabular}}{{{alignment}}}\n\\hline\n{headers}\\hline\n{rows}\\hline\n\\end{{tabular}}\n")
+    }
 }
 
-/// A cell as CSV takes it.
+/// Replaces the characters that LaTeX would interpret.
+fn latex_text(cell: &str) -> String {
+    let mut text = String::new();
+    for c in cell.chars() {
+        match c {
+            '&' | '%' | '$' | '#' | '_' | '{' | '}' => text.extend(['\\', c]),
+            '\\' => text += "\\textbackslash{}",
+            '~' => text += "\\textasciitilde{}",
+            '^' => text += "\\textasciicircum{}",
+            '°' => text += "$^\\circ$",
+            '−' => text += "$-$",
+            '–' => text += "--",
+            c => text.push(c),
+        }
+    }
+    text
+}
+
+/// Quotes a cell for CSV.
 fn quoted(cell: &str) -> String {
     if cell.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
 }
@@ -103,6 +138,15 @@ mod tests {
         let expected = "| sequence |   RMSE |    n |\n| -------- | -----: | ---: |\n| crowd\\|1 | 0.0156 | 1200 |\n\
                         | größer   |   12.0 |      |\n";
         assert_eq!(example().render(TableStyle::Markdown), expected);
+    }
+
+    #[test]
+    fn latex_escapes_what_it_would_interpret() {
+        let mut table = Table::new(["sequence", "improvement (%)"]);
+        table.push(["walking_xyz", "−0.5 & more"]);
+        let expected = "\\begin{tabular}{lr}\n\\hline\nsequence & improvement (\\%) \\\\\n\\hline\n\
+                        walking\\_xyz & $-$0.5 \\& more \\\\\n\\hline\n\\end{tabular}\n";
+        assert_eq!(table.render(TableStyle::Latex), expected);
     }
 
     #[test]

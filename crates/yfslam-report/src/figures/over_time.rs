@@ -1,9 +1,9 @@
 //! In: errors of all methods. Out: how they change over time (paper Fig. 5 d to f).
 
 use super::axis::{Axis, length, length_unit};
-use super::figure::{Figure, Mark};
 use super::ink::Ink;
 use super::path::Point;
+use super::plot::{Figure, Mark};
 use super::scene::{Captioned, Drawn, LOG_FROM_RATIO, Scene, WIDTH};
 use super::series::Off;
 

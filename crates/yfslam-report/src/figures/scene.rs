@@ -1,9 +1,9 @@
 //! In: a report. Out: what all its figures are made of: one clock, one world, one colour a method.
 
-use super::Report;
 use super::ink::Ink;
 use super::orientation::Mount;
 use super::series::{At, Clock, Series};
+use crate::content::Report;
 
 /// Width of every figure, px: two stand side by side on a wide page, and one fits a phone.
 pub const WIDTH: f64 = 560.0;
@@ -38,7 +38,7 @@ impl<'a> Scene<'a> {
     pub fn new(report: &'a Report) -> Self {
         let clock = Clock::new(report);
         let mount = Mount::of(report);
-        let drawn = |(place, method): (usize, &'a super::MethodReport)| Drawn {
+        let drawn = |(place, method): (usize, &'a crate::content::MethodReport)| Drawn {
             name: method.name,
             ink: Ink::method(method.name, place),
             series: Series::new(report, method, &clock, &mount),

@@ -2,9 +2,9 @@
 
 use maud::{Markup, html};
 
-use super::ink::Ink;
-use super::{MethodReport, Report, Stage};
-use crate::{Delta, Evaluation, Rpe, Statistics, improvement_percent};
+use crate::content::{MethodReport, Report, Stage};
+use crate::figures::ink::Ink;
+use yfslam_eval::{Delta, Evaluation, Rpe, Statistics, improvement_percent};
 
 /// Finds a figure among the errors of a method.
 type Find = Box<dyn Fn(&Evaluation) -> Option<f64>>;

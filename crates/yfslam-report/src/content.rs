@@ -1,34 +1,6 @@
-//! In: what became of one sequence under one or more methods, as plain data. Out: one HTML page that needs nothing but itself.
-//!
-//! | section | of the paper |
-//! |---|---|
-//! | errors and improvement | Tables 2 to 4, equation 3 |
-//! | bars of RMSE and S.D. | Fig. 6 |
-//! | trajectory from above and from the side, errors over time | Fig. 5 |
-//! | pictures with static and dynamic features | Fig. 7 |
-//! | dense map, if there is one | |
-//! | times | Table 5 |
-//!
-//! The same data give the same bytes. Measured times stand in elements with the attribute `data-timing`, and nowhere else: without
-//! them, the page of a run is the page of its repetition.
+//! The content of a report, as plain data.
 
-mod axis;
-mod bars;
-mod dense;
-mod figure;
-mod ink;
-mod orientation;
-mod over_time;
-mod page;
-mod path;
-mod scene;
-mod series;
-mod tables;
-mod tables_page;
-mod views;
-
-use crate::{Evaluation, StampedPose};
-pub use tables_page::{IMPROVEMENT, ORIGIN, PUBLISHED, TableSection, TablesPage};
+use yfslam_eval::{Evaluation, StampedPose};
 
 /// What a report is about.
 #[derive(Clone, Debug)]
@@ -144,7 +116,7 @@ pub struct DenseMap {
 impl Report<'_> {
     /// The page.
     pub fn html(&self) -> String {
-        page::page(self).into_string()
+        crate::html::page::page(self).into_string()
     }
 }
 

@@ -4,8 +4,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 
-use super::ink::Ink;
-use super::{DenseMap, MethodReport, Report};
+use crate::content::{DenseMap, MethodReport, Report};
+use crate::figures::ink::Ink;
 
 /// The section; nothing if no method has a dense map.
 pub fn dense(report: &Report) -> Markup {
