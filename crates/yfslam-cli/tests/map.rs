@@ -140,7 +140,7 @@ fn the_map_of_two_sessions_shows_what_either_has_seen() {
     fails(
         folder.path(),
         &[&again[..], &["--save-map", "both.map"]].concat(),
-        &["first.map holds dense pieces", "--dense"],
+        &["first.map holds a dense map", "--dense"],
     );
     succeeds(folder.path(), &[&again[..], &["--dense", "--save-map", "both.map", "--out", "second"]].concat());
     let read = |name: &str| fs::read(folder.path().join(name)).unwrap();

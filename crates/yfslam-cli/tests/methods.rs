@@ -23,7 +23,7 @@ fn assert_same_together_and_alone(folder: &Path, args: &[&str]) {
             assert_eq!(fs::read(together.join(name)).unwrap(), fs::read(alone.join(name)).unwrap(), "{method}: {name}");
         }
         let (together, alone) = (report(&together), report(&alone));
-        for key in ["evaluation", "frames", "boxes", "config", "places", "map"] {
+        for key in ["evaluation", "frames", "boxes", "config", "loops_and_relocalisation", "map"] {
             assert_eq!(together[key], alone[key], "{method}: {key}");
         }
         assert_eq!(together["dynamic"]["dynamic_features"], alone["dynamic"]["dynamic_features"], "{method}");

@@ -19,6 +19,8 @@ pub struct Report<'a> {
     pub shared_stages: Vec<Stage>,
     /// Wall time from the first frame to the last, of everything together, s.
     pub wall_s: f64,
+    /// Processor time of the whole process; `None` where it is not known.
+    pub processor_time: Option<ProcessorTime>,
     /// Version of the program.
     pub version: &'a str,
     /// The command that gives this report again.
@@ -68,8 +70,15 @@ pub struct Times {
     pub stages: Vec<Stage>,
     /// Wall time of tracking alone, all frames together, s.
     pub tracking_s: f64,
-    /// Processor time of tracking and detection, all threads together, without reading or rendering, s; `None` where it is not known.
-    pub cpu_s: Option<f64>,
+}
+
+/// Processor time of the whole process for one frame, all threads and methods together.
+#[derive(Clone, Debug, Default)]
+pub struct ProcessorTime {
+    /// The total, ms.
+    pub total_ms: f64,
+    /// What it consists of, ms; the last part is the rest.
+    pub parts: Vec<(String, f64)>,
 }
 
 /// Wall time of one stage.
@@ -111,13 +120,6 @@ pub struct DenseMap {
     pub resolution_m: f32,
     /// From above and from a corner: as PNG, with width and height, px.
     pub views: [(Vec<u8>, [usize; 2]); 2],
-}
-
-impl Report<'_> {
-    /// The page.
-    pub fn html(&self) -> String {
-        crate::html::page::page(self).into_string()
-    }
 }
 
 impl Frames {

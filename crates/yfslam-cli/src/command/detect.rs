@@ -12,8 +12,8 @@ use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
 
 use crate::input::detector::{self, DetectorArgs, LoadedDetector};
-use crate::input::instance_detector::Apart;
-use crate::output::detections_file::{FoundBox, FoundIn, FoundList, Look};
+use crate::input::instance_detector::InstanceDetector;
+use crate::output::detections_file::{DetectionsFile, ImageDetections, ImageResult, ObjectBox};
 use crate::output::folder::{OutputFolder, remove_files};
 use crate::stats::stages::StageSummary;
 use crate::ui::progress::Progress;
@@ -73,15 +73,15 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
     let files = args.files()?;
     let config = DetectorConfig { score_threshold: args.score, iou_threshold: args.iou, ..Default::default() };
     let LoadedDetector { detector, times, identity } = detector::load(&args.detector, config)?;
-    let mut detector = Apart::new(detector);
-    let known = detector.known().to_vec();
+    let mut detector = InstanceDetector::new(detector);
+    let known = detector.network_classes().to_vec();
     if let Some(unknown) = args.classes.iter().find(|class| !known.contains(class)) {
         bail!("the network does not know the class '{unknown}' (--class); it knows: {}", known.join(", "));
     }
     let out = OutputFolder::prepare(Some(&args.out), "detect")?;
     let pictures = args.pictures.then(|| pictures(&out)).transpose()?;
     let wanted = |class: &&str| args.classes.is_empty() || args.classes.iter().any(|asked| asked == class);
-    let mut list = FoundList {
+    let mut list = DetectionsFile {
         yfslam: env!("CARGO_PKG_VERSION"),
         model: &identity,
         score_threshold: args.score,
@@ -91,24 +91,24 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
     let mut progress = Progress::new(terminal, "detect", files.len());
     let mut upright = Upright::default();
     for (index, file) in files.iter().enumerate() {
-        let look = match look(file, &mut detector, &mut upright, args.roll) {
+        let result = match detect(file, &mut detector, &mut upright, args.roll) {
             Ok((image, detections)) => {
                 let mask = upright.mask(&detector);
                 let of = |d: Detection| {
                     let class = detector.class_names().get(d.class).map(String::as_str).filter(wanted)?;
-                    Some(FoundBox::new(d, class, mask))
+                    Some(ObjectBox::new(d, class, mask))
                 };
-                let boxes: Vec<FoundBox> = detections.into_iter().filter_map(of).collect();
+                let boxes: Vec<ObjectBox> = detections.into_iter().filter_map(of).collect();
                 if let Some(folder) = &pictures {
                     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
                     write_color_png(&folder.join(format!("{index:06}-{stem}.png")), &list.draw(&image, &boxes))?;
                 }
-                Look::Seen { width: image.width(), height: image.height(), boxes }
+                ImageResult::Detected { width: image.width(), height: image.height(), boxes }
             }
-            Err(error) => Look::Unread { error: explain(&error) },
+            Err(error) => ImageResult::Unreadable { error: explain(&error) },
         };
-        let found = FoundIn { file: file.display().to_string(), look };
-        if matches!(found.look, Look::Unread { .. }) {
+        let found = ImageDetections { file: file.display().to_string(), result };
+        if found.is_unreadable() {
             terminal.warn(&found.to_string());
         } else if files.len() <= TOLD {
             terminal.result(&format!("{found}\n"))?;
@@ -125,7 +125,7 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
         list.summary(),
         out.path().display()
     ))?;
-    let unread = list.images.iter().filter(|image| matches!(image.look, Look::Unread { .. })).count();
+    let unread = list.images.iter().filter(|image| image.is_unreadable()).count();
     ensure!(
         unread == 0,
         "{unread} of {} images could not be read; see the warnings, or `error` in boxes.json",
@@ -180,7 +180,12 @@ fn pictures(out: &OutputFolder) -> Result<PathBuf> {
 }
 
 /// Reads an image and finds boxes in it, where the camera was rolled by `roll_deg`.
-fn look(file: &Path, detector: &mut Apart, upright: &mut Upright, roll_deg: i32) -> Result<(RgbImage, Vec<Detection>)> {
+fn detect(
+    file: &Path,
+    detector: &mut InstanceDetector,
+    upright: &mut Upright,
+    roll_deg: i32,
+) -> Result<(RgbImage, Vec<Detection>)> {
     let bytes = std::fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
     let (mut image, mut found) = (RgbImage::default(), Vec::new());
     decode_color(&bytes, None, &mut image).map_err(|error| anyhow!("{} {error}", file.display()))?;

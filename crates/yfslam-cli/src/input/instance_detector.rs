@@ -1,32 +1,32 @@
-//! Objects of a network told apart, whatever their classes.
+//! Instance segmentation: one object is told from another, also of the same class.
 //!
-//! In: a network. Out: a detector whose mask shows objects.
+//! In: a network. Out: a detector whose mask shows instances.
 
 use yfslam::image::{Image, RgbImage};
 use yfslam::{Detection, Detector, DetectorError};
 use yfslam_detect::Network;
 
-/// A network each of whose objects is a class of its own, called as the object's class is: the mask shows one object from another.
-/// The first 255 are told apart, and in one image alone.
-pub struct Apart {
+/// A network whose detections have a class number for each object, under the name of the object's class. Its mask holds these numbers,
+/// so it shows instances; it is limited to 255 objects in an image, and the numbers change from image to image.
+pub struct InstanceDetector {
     network: Box<dyn Network>,
     names: Vec<String>,
     mask: Option<Image<u8>>,
 }
 
-impl Apart {
+impl InstanceDetector {
     pub fn new(network: Box<dyn Network>) -> Self {
         Self { network, names: Vec::new(), mask: None }
     }
 
-    /// Names of the classes that the network knows.
-    pub fn known(&self) -> &[String] {
+    /// Returns the names of the network's classes.
+    pub fn network_classes(&self) -> &[String] {
         self.network.class_names()
     }
 }
 
-impl Detector for Apart {
-    /// Those of the objects in the image seen last.
+impl Detector for InstanceDetector {
+    /// Returns the class name of each object in the last image.
     fn class_names(&self) -> &[String] {
         &self.names
     }
@@ -35,9 +35,9 @@ impl Detector for Apart {
         self.network.detect(image, out)?;
         let known = self.network.class_names();
         self.names.clear();
-        for (index, found) in out.iter_mut().enumerate() {
-            self.names.push(known.get(found.class).cloned().unwrap_or_default());
-            found.class = index;
+        for (index, detection) in out.iter_mut().enumerate() {
+            self.names.push(known.get(detection.class).cloned().unwrap_or_default());
+            detection.class = index;
         }
         self.mask = self.network.objects().map(|objects| {
             let mut mask = Image::new(objects.width(), objects.height());
@@ -60,7 +60,7 @@ mod tests {
 
     use super::*;
 
-    /// Finds two dogs, one above the other.
+    /// Detects two dogs, one above the other.
     struct Dogs(Vec<String>, Image<u16>);
 
     impl Detector for Dogs {
@@ -90,14 +90,15 @@ mod tests {
     }
 
     #[test]
-    fn objects_of_one_class_are_told_apart_even_in_a_picture_that_is_turned_for_them() {
+    fn objects_of_one_class_are_separate_instances_also_in_an_image_with_roll_compensation() {
         for (roll, above) in [(0, 1), (180, 2)] {
-            let mut apart = Apart::new(Box::new(Dogs(vec!["cat".into(), "dog".into()], Image::default())));
+            let mut instances =
+                InstanceDetector::new(Box::new(Dogs(vec!["cat".into(), "dog".into()], Image::default())));
             let (mut upright, mut found) = (Upright::default(), Vec::new());
-            upright.detect(&mut apart, &RgbImage::new(40, 30), roll, &mut found).unwrap();
-            assert_eq!(apart.class_names(), ["dog", "dog"]);
-            assert_eq!(found.iter().map(|found| found.class).collect::<Vec<_>>(), [0, 1]);
-            let mask = upright.mask(&apart).unwrap();
+            upright.detect(&mut instances, &RgbImage::new(40, 30), roll, &mut found).unwrap();
+            assert_eq!(instances.class_names(), ["dog", "dog"]);
+            assert_eq!(found.iter().map(|detection| detection.class).collect::<Vec<_>>(), [0, 1]);
+            let mask = upright.mask(&instances).unwrap();
             assert_eq!([mask.get(20, 5), mask.get(20, 25)], [Some(&above), Some(&(3 - above))], "{roll}");
         }
     }

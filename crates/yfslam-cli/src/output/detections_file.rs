@@ -1,4 +1,4 @@
-//! What a network found in images: as JSON, as pictures, in words.
+//! Detections in a set of images: as the JSON file `boxes.json`, drawn on the images, and as text.
 
 use std::fmt;
 use std::path::Path;
@@ -9,97 +9,101 @@ use yfslam::Detection;
 use yfslam::image::{Image, RgbImage};
 use yfslam_io::write_atomically;
 
-use super::rle::Runs;
+use super::rle::Rle;
 use crate::draw::shapes::{Color, bar, rectangle, stain};
 use crate::input::detector::ModelIdentity;
 
-/// Colours of the classes, in their order; then they repeat.
+/// Colours of the classes, in their order; they repeat.
 const COLORS: [Color; 6] =
     [[255, 220, 0], [0, 200, 255], [255, 90, 200], [60, 255, 60], [255, 120, 30], [170, 130, 255]];
-/// Width of an outline for each so many pixels of the image's longer side.
+/// Pixels of the image's longer side for each pixel of the width of an outline.
 const LINE_SHARE: usize = 320;
-/// Share of its class's colour in a pixel that shows an object.
+/// Share of the class's colour in the pixels of an object.
 const MASK_SHARE: f32 = 0.45;
 
-/// All that was found.
+/// The content of the detections file.
 #[derive(Serialize)]
-pub struct FoundList<'a> {
+pub struct DetectionsFile<'a> {
     /// Version of this program.
     pub yfslam: &'static str,
     pub model: &'a ModelIdentity,
-    /// Least score of a box.
+    /// Lowest score of a box.
     pub score_threshold: f32,
-    /// Names of the classes that were looked for.
+    /// Names of the classes in this file.
     pub classes: Vec<&'a str>,
     #[serde(skip)]
-    pub images: Vec<FoundIn>,
+    pub images: Vec<ImageDetections>,
 }
 
-/// What became of one image.
+/// The detections in one image.
 #[derive(Serialize)]
-pub struct FoundIn {
+pub struct ImageDetections {
     pub file: String,
     #[serde(flatten)]
-    pub look: Look,
+    pub result: ImageResult,
 }
 
-/// What a look at an image gave.
+/// The result for one image.
 #[derive(Serialize)]
 #[serde(untagged)]
-pub enum Look {
-    Seen {
+pub enum ImageResult {
+    Detected {
         /// px.
         width: usize,
         /// px.
         height: usize,
-        /// Best first.
-        boxes: Vec<FoundBox>,
+        /// Highest score first.
+        boxes: Vec<ObjectBox>,
     },
-    /// It could not be read.
-    Unread { error: String },
+    /// The image could not be read.
+    Unreadable { error: String },
 }
 
-/// One thing that was found.
+/// One detected object.
 #[derive(Serialize)]
-pub struct FoundBox {
+pub struct ObjectBox {
     pub class: String,
     /// In (0, 1).
     pub score: f32,
     /// Left, top, right and bottom edge, px; pixel (x, y) is inside if left ≤ x < right and top ≤ y < bottom.
     pub bbox: [f32; 4],
-    /// What of the image shows it, from a network that segments. Of things one over another the best takes a pixel.
+    /// The pixels of the object, from a network that segments. Where objects overlap, a pixel belongs to the one with the highest score.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub mask: Option<Runs>,
+    pub mask: Option<Rle>,
 }
 
-impl FoundBox {
-    /// An object whose class is called `name`; `mask` shows it as 1 + its `class`.
+impl ObjectBox {
+    /// Converts a detection of class `name`; its pixels in `mask` have the value 1 + `class`.
     pub fn new(Detection { class, score, bbox }: Detection, name: &str, mask: Option<&Image<u8>>) -> Self {
-        let mask = mask.zip(u8::try_from(class + 1).ok()).map(|(mask, value)| Runs::of(mask, value));
+        let mask = mask.zip(u8::try_from(class + 1).ok()).map(|(mask, value)| Rle::encode(mask, value));
         Self { class: name.to_owned(), score, bbox: [bbox.x_min, bbox.y_min, bbox.x_max, bbox.y_max], mask }
     }
 }
 
-impl FoundIn {
-    /// What was found.
-    pub fn boxes(&self) -> &[FoundBox] {
-        match &self.look {
-            Look::Seen { boxes, .. } => boxes,
-            Look::Unread { .. } => &[],
+impl ImageDetections {
+    /// Returns the detected objects.
+    pub fn boxes(&self) -> &[ObjectBox] {
+        match &self.result {
+            ImageResult::Detected { boxes, .. } => boxes,
+            ImageResult::Unreadable { .. } => &[],
         }
+    }
+
+    pub fn is_unreadable(&self) -> bool {
+        matches!(self.result, ImageResult::Unreadable { .. })
     }
 }
 
-impl fmt::Display for FoundIn {
+impl fmt::Display for ImageDetections {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match &self.look {
-            Look::Seen { width, height, .. } => write!(f, "{} ({width}×{height} px): ", self.file)?,
-            Look::Unread { error } => return f.write_str(error),
+        match &self.result {
+            ImageResult::Detected { width, height, .. } => write!(f, "{} ({width}×{height} px): ", self.file)?,
+            ImageResult::Unreadable { error } => return f.write_str(error),
         }
         if self.boxes().is_empty() {
-            return f.write_str("nothing found");
+            return f.write_str("no detections");
         }
-        for (index, FoundBox { class, score, bbox: [left, top, right, bottom], .. }) in self.boxes().iter().enumerate()
+        for (index, ObjectBox { class, score, bbox: [left, top, right, bottom], .. }) in self.boxes().iter().enumerate()
         {
             let comma = if index == 0 { "" } else { ", " };
             write!(f, "{comma}{class} {score:.2} at {left:.0},{top:.0}–{right:.0},{bottom:.0}")?;
@@ -108,8 +112,8 @@ impl fmt::Display for FoundIn {
     }
 }
 
-impl FoundList<'_> {
-    /// Writes them as JSON, one image a line.
+impl DetectionsFile<'_> {
+    /// Writes the file with one line for each image.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -125,37 +129,38 @@ impl FoundList<'_> {
         })?)
     }
 
-    /// Number of images and boxes, in a line.
+    /// Returns a line with the number of images and objects.
     pub fn summary(&self) -> String {
-        let count = |class: &str| self.images.iter().flat_map(FoundIn::boxes).filter(|b| b.class == class).count();
-        let found = self.classes.iter().map(|class| (count(class), class)).filter(|(count, _)| *count > 0);
-        let found: Vec<String> = found.map(|(count, class)| format!("{count} × {class}")).collect();
+        let count =
+            |class: &str| self.images.iter().flat_map(ImageDetections::boxes).filter(|b| b.class == class).count();
+        let counts = self.classes.iter().map(|class| (count(class), class)).filter(|(count, _)| *count > 0);
+        let found: Vec<String> = counts.map(|(count, class)| format!("{count} × {class}")).collect();
         let found = if found.is_empty() { "nothing".to_owned() } else { found.join(", ") };
         format!("{found} found in {} images", self.images.len())
     }
 
-    /// The picture of `image` with its boxes and masks.
-    pub fn draw(&self, image: &RgbImage, boxes: &[FoundBox]) -> RgbImage {
-        let mut picture = image.clone();
+    /// Draws boxes and masks on a copy of `image`.
+    pub fn draw(&self, image: &RgbImage, boxes: &[ObjectBox]) -> RgbImage {
+        let mut drawn = image.clone();
         let line = (image.width().max(image.height()) / LINE_SHARE).max(1) as i64 + 1;
         let color = |class: &str| {
-            let place = self.classes.iter().position(|known| *known == class).unwrap_or(0);
-            COLORS[place % COLORS.len()]
+            let index = self.classes.iter().position(|known| *known == class).unwrap_or(0);
+            COLORS[index % COLORS.len()]
         };
-        for FoundBox { class, mask, .. } in boxes {
+        for ObjectBox { class, mask, .. } in boxes {
             if let Some(mask) = mask {
-                stain(&mut picture, &mask.mask(), color(class), MASK_SHARE);
+                stain(&mut drawn, &mask.decode(), color(class), MASK_SHARE);
             }
         }
-        for FoundBox { class, score, bbox, .. } in boxes.iter().rev() {
+        for ObjectBox { class, score, bbox, .. } in boxes.iter().rev() {
             let color = color(class);
             // A float cast saturates.
             let [left, top, right, bottom] = bbox.map(|edge| edge as i64);
-            rectangle(&mut picture, [left, top], [right - 1, bottom - 1], line, color);
+            rectangle(&mut drawn, [left, top], [right - 1, bottom - 1], line, color);
             let length = (f64::from(*score) * (right - left) as f64) as i64;
-            bar(&mut picture, [left, top], [left + length - 1, top + 3 * line], color);
+            bar(&mut drawn, [left, top], [left + length - 1, top + 3 * line], color);
         }
-        picture
+        drawn
     }
 }
 
@@ -166,9 +171,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn boxes_are_outlined_in_the_colour_of_their_class_with_a_bar_as_long_as_the_score() {
+    fn boxes_have_the_colour_of_their_class_and_a_bar_as_long_as_the_score() {
         let model = ModelIdentity { file: "x".into(), bytes: 1, sha256: String::new(), classes: 2, integers: false };
-        let list = FoundList {
+        let list = DetectionsFile {
             yfslam: "",
             model: &model,
             score_threshold: 0.3,
@@ -176,25 +181,25 @@ mod tests {
             images: vec![],
         };
         let bbox = BoundingBox { x_min: 10.0, y_min: 10.0, x_max: 60.0, y_max: 50.0 };
-        let found = [FoundBox::new(Detection { class: 1, score: 0.5, bbox }, "dog", None)];
-        let picture = list.draw(&RgbImage::new(80, 60), &found);
-        let is_drawn = |x, y| picture.get(x, y) == Some(&COLORS[1]);
+        let found = [ObjectBox::new(Detection { class: 1, score: 0.5, bbox }, "dog", None)];
+        let drawn = list.draw(&RgbImage::new(80, 60), &found);
+        let is_drawn = |x, y| drawn.get(x, y) == Some(&COLORS[1]);
         assert!([(10, 10), (59, 10), (10, 49), (59, 49), (58, 48)].iter().all(|&(x, y)| is_drawn(x, y)));
         assert!(is_drawn(34, 15) && !is_drawn(35, 15) && !is_drawn(9, 10) && !is_drawn(60, 20) && !is_drawn(30, 30));
         assert!(serde_json::to_value(&found[0]).unwrap().get("mask").is_none());
     }
 
     #[test]
-    fn what_shows_an_object_is_tinted_in_the_colour_of_its_class_and_listed_in_runs() {
+    fn pixels_of_an_object_are_tinted_in_the_colour_of_its_class_and_run_length_encoded() {
         let model = ModelIdentity { file: "x".into(), bytes: 1, sha256: String::new(), classes: 1, integers: false };
         let list =
-            FoundList { yfslam: "", model: &model, score_threshold: 0.3, classes: vec!["person"], images: vec![] };
+            DetectionsFile { yfslam: "", model: &model, score_threshold: 0.3, classes: vec!["person"], images: vec![] };
         // Of two objects, 1 in the upper and 2 in the lower half of a box, the second is drawn.
         let mask = Image::from_vec(40, 40, (0..1600).map(|index| 1 + u8::from(index >= 800)).collect()).unwrap();
         let bbox = BoundingBox { x_min: 0.0, y_min: 0.0, x_max: 40.0, y_max: 40.0 };
-        let found = [FoundBox::new(Detection { class: 1, score: 0.5, bbox }, "person", Some(&mask))];
-        let picture = list.draw(&RgbImage::new(40, 40), &found);
-        let [beside, edge, inside] = [19, 20, 30].map(|y| *picture.get(20, y).unwrap());
+        let found = [ObjectBox::new(Detection { class: 1, score: 0.5, bbox }, "person", Some(&mask))];
+        let drawn = list.draw(&RgbImage::new(40, 40), &found);
+        let [beside, edge, inside] = [19, 20, 30].map(|y| *drawn.get(20, y).unwrap());
         assert_eq!((beside, edge, inside), ([0; 3], COLORS[0], COLORS[0].map(|value| (f32::from(value) * 0.45) as u8)));
         let json = serde_json::to_value(&found[0]).unwrap();
         assert_eq!(json["mask"]["size"], serde_json::json!([40, 40]));

@@ -10,6 +10,7 @@ use yfslam_io::write_atomically;
 use yfslam_report::{Frames, MethodReport, Report, Stage, Times};
 
 use super::folder::OutputFolder;
+use super::processor_time::processor_time;
 use super::report::ReportedRun;
 use crate::input::boxes::BoxOrigin;
 use crate::input::settings::describe;
@@ -44,6 +45,7 @@ fn page(runs: &[ReportedRun], shared: &Stages) -> Result<String> {
         methods: methods.collect::<Result<_>>()?,
         shared_stages: stages(shared),
         wall_s,
+        processor_time: processor_time(runs),
         version: env!("CARGO_PKG_VERSION"),
         command: command_line(),
     };
@@ -66,11 +68,7 @@ fn method<'a>(run: &ReportedRun<'a>, trajectory: &'a [StampedPose]) -> Result<Me
             lost: tally.lost,
             skipped: tally.skipped_by_reason.iter().map(|(reason, count)| ((*reason).to_owned(), *count)).collect(),
         },
-        times: Times {
-            stages: stages(&outcome.stages),
-            tracking_s: outcome.stages.total("frame").as_secs_f64(),
-            cpu_s: outcome.cpu.map(|cpu| cpu.as_secs_f64()),
-        },
+        times: Times { stages: stages(&outcome.stages), tracking_s: outcome.stages.total("frame").as_secs_f64() },
         pictures: images.snapshots.clone(),
         dense: images.dense.clone(),
         config: config.to_commented_toml()?,

@@ -11,6 +11,7 @@ use crate::input::boxes::BoxOrigin;
 use crate::input::source::{MaskTally, Source, Truth};
 use crate::run::dense::DenseCost;
 use crate::run::method_run::RunResult;
+use crate::stats::process::FrameCost;
 use crate::stats::recognition::RecognitionTally;
 use crate::stats::stages::Stages;
 use crate::stats::tally::{DynamicTally, FrameTally};
@@ -25,6 +26,8 @@ pub struct ReportedRun<'a> {
     pub truth: Option<&'a Truth>,
     pub result: &'a RunResult<'a>,
     pub images: &'a ReportImages,
+    /// Processor time of a frame; `None` where the system does not measure it.
+    pub cost: Option<FrameCost>,
 }
 
 /// The content of `run.json`.
@@ -50,15 +53,19 @@ pub struct RunReport<'a> {
     pub map: MapSize,
     /// Cost of the dense map; `null` if none was made.
     pub dense: Option<DenseCost>,
-    /// Wall time of each stage over all frames; `mapping` over keyframes. Decoding runs beside all; `detector` runs beside `features`
-    /// or, if the frames are taken through several methods, once for all of them.
+    /// Wall time of each stage over all frames; `mapping` over keyframes. Decoding runs on threads of its own; `detector` runs in parallel
+    /// with `features` or, with several methods, once for all of them.
     pub times: Stages,
     pub wall_s: f64,
     pub fps: f64,
-    /// Processor time of tracking and detection, without reading or rendering; `null` where the system does not tell. Detection counts
-    /// in full for each method that it was done for.
-    pub cpu_s: Option<f64>,
-    /// Peak resident memory, MB (10⁶ bytes); `null` where the system does not tell.
+    /// Processor time of the whole process over all frames, all methods of the run together; `null` where the system does not measure
+    /// it.
+    pub process_cpu_s: Option<f64>,
+    /// The same for one frame.
+    pub process_ms_per_frame: Option<f64>,
+    /// What it consists of, ms for one frame.
+    pub process_parts_ms_per_frame: Option<FrameCost>,
+    /// Peak resident memory, MB (10⁶ bytes); `null` where the system does not report it.
     pub peak_memory_mb: Option<f64>,
     /// Errors against the ground truth, if there is one.
     pub groundtruth: Option<&'a str>,
@@ -89,7 +96,7 @@ pub struct Association {
 impl<'a> RunReport<'a> {
     /// Builds the report of one method run.
     pub fn new(run: &ReportedRun<'a>) -> Self {
-        let ReportedRun { sequence, source, faults, truth, result, .. } = *run;
+        let ReportedRun { sequence, source, faults, truth, result, cost, .. } = *run;
         let RunResult { config, outcome, boxes, shared, .. } = result;
         Self {
             yfslam: env!("CARGO_PKG_VERSION"),
@@ -108,7 +115,9 @@ impl<'a> RunReport<'a> {
             times: shared.and(&outcome.stages),
             wall_s: outcome.wall.as_secs_f64(),
             fps: outcome.fps(),
-            cpu_s: outcome.cpu.map(|cpu| cpu.as_secs_f64()),
+            process_cpu_s: cost.map(|cost| cost.process_s),
+            process_ms_per_frame: cost.map(|cost| cost.total),
+            process_parts_ms_per_frame: cost,
             peak_memory_mb: peak_memory_mb(),
             groundtruth: truth.map(|truth| truth.origin.as_str()),
             evaluation: result.evaluation(),

@@ -6,10 +6,11 @@ use anyhow::Result;
 use yfslam_eval::{AlignmentKind, improvement_percent};
 use yfslam_report::{Table, TableStyle};
 
+use super::processor_time::{describe_processor_time, processor_time};
 use super::report::{ReportedRun, RunReport};
 use crate::input::boxes::BoxOrigin;
 use crate::input::settings::describe;
-use crate::input::source::{Source, Truth};
+use crate::input::source::Truth;
 use crate::run::method_run::RunResult;
 use crate::stats::recognition::{Loop, RecognitionTally};
 
@@ -55,6 +56,9 @@ pub fn of_one(report: &RunReport, run: &ReportedRun) -> Result<String> {
         )?;
     }
     write_recognition(&mut text, &outcome.recognition)?;
+    if let Some(time) = processor_time(std::slice::from_ref(run)) {
+        text += &describe_processor_time(&time);
+    }
     write!(text, "map: {} keyframes, {} landmarks", report.map.keyframes, report.map.landmarks)?;
     if let Some(peak) = report.peak_memory_mb {
         write!(text, "; peak memory {peak:.0} MB")?;
@@ -89,15 +93,17 @@ fn write_recognition(text: &mut String, recognition: &RecognitionTally) -> Resul
 }
 
 /// Summarises the errors of several methods as a table, as in Table 2 of the paper.
-pub fn of_several(results: &[&RunResult], source: &Source, truth: Option<&Truth>) -> String {
+pub fn of_several(runs: &[ReportedRun], truth: Option<&Truth>) -> String {
+    let results: Vec<&RunResult> = runs.iter().map(|run| run.result).collect();
+    let source = runs.first().map_or("", |run| run.source.name.as_str());
     let kind =
         results.iter().find_map(|result| result.evaluation()).map_or(AlignmentKind::Se3, |e| e.ate.alignment.kind);
     let ate = format!("ATE, {kind} (m)");
     let headers =
         [ate.as_str(), "RMSE", "S.D.", "mean", "median", "max", "improve RMSE (%)", "S.D. (%)", "frames tracked"];
     let mut table = Table::new(headers);
-    let errors_of = |result: &&RunResult| result.evaluation().map(|e| e.ate.translation_m);
-    let original = results.first().and_then(errors_of);
+    let errors_of = |result: &RunResult| result.evaluation().map(|e| e.ate.translation_m);
+    let original = results.first().and_then(|result| errors_of(result));
     for (index, result) in results.iter().enumerate() {
         let RunResult { config, outcome, .. } = result;
         let (name, summary) = describe(config.dynamic.method);
@@ -120,9 +126,9 @@ pub fn of_several(results: &[&RunResult], source: &Source, truth: Option<&Truth>
     let boxes = results.iter().map(|result| result.boxes).find(|boxes| !matches!(boxes, BoxOrigin::None));
     let truth = truth.map_or("none", |truth| truth.origin.as_str());
     format!(
-        "{}; boxes: {}; ground truth: {truth}\n\n{}",
-        source.name,
+        "{source}; boxes: {}; ground truth: {truth}\n\n{}{}",
         boxes.unwrap_or(&BoxOrigin::None),
-        table.render(TableStyle::Plain)
+        table.render(TableStyle::Plain),
+        processor_time(runs).map_or(String::new(), |time| format!("\n{}", describe_processor_time(&time)))
     )
 }

@@ -107,6 +107,7 @@ impl DenseRun {
             [extracted, started.elapsed() - extracted]
         });
         self.patches += 1;
+        pipeline.add_dense(cpu.unwrap_or_default());
         self.cpu = self.cpu.zip(cpu).map(|(sum, took)| sum + took);
         for (stage, took) in ["dense patch", "dense map"].into_iter().zip(took) {
             pipeline.stages.push(stage, took);

@@ -4,7 +4,7 @@
 
 use anyhow::Result;
 use yfslam::tracking::TrackingState;
-use yfslam::{Config, Detector, RgbdFrame, Slam};
+use yfslam::{Config, Detector, Execution, RgbdFrame, Slam};
 use yfslam_eval::{AlignmentKind, EvalError, EvalOptions, Evaluation, ExpectedFrames};
 
 use super::dense::{DenseCost, DenseResult, DenseRun};
@@ -70,7 +70,7 @@ impl MethodRun {
         let (detector, times) = detector.map(|d| (d.detector as Box<dyn Detector>, d.times)).unzip();
         let earlier = map.dense_map(makes_dense_map)?;
         let slam = map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
-        let pipeline = Pipeline::new(slam, times);
+        let pipeline = Pipeline::new(slam, map.execution() == Execution::Inline, times);
         let (camera, execution) = (&source.camera.camera, map.execution());
         let dense = makes_dense_map
             .then(|| DenseRun::new(&config.dense, camera, execution, earlier, pipeline.slam()))
@@ -104,9 +104,8 @@ impl MethodRun {
         let mut shared = context.reading.clone();
         let needs_boxes = config.dynamic.method.needs_boxes();
         if needs_boxes {
-            let DetectionTally { stages, cpu, failures } = context.detection;
+            let DetectionTally { stages, failures, .. } = context.detection;
             shared = shared.and(stages);
-            outcome.cpu = outcome.cpu.zip(*cpu).map(|(own, shared)| own + shared);
             outcome.frames.detector_failures += failures;
         }
         let evaluation = context.truth.map(|truth| {

@@ -16,6 +16,7 @@ use yfslam_io::write::PlyPoint;
 
 use crate::input::detector::Took;
 use crate::stats::cpu;
+use crate::stats::process::{Part, Parts};
 use crate::stats::recognition::RecognitionTally;
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
@@ -33,7 +34,8 @@ pub struct Pipeline {
     resets: usize,
     made_keyframe: bool,
     detector_times: Option<Receiver<Took>>,
-    cpu: Option<Duration>,
+    parts: Parts,
+    maps_inline: bool,
     started: Instant,
     state: TrackingState,
     /// Most features, and most of them with depth, in a frame before the map began.
@@ -56,13 +58,13 @@ pub struct Outcome {
     pub stages: Stages,
     /// From the first frame to the last.
     pub wall: Duration,
-    /// Processor time of tracking and detection; `None` where the system does not tell.
-    pub cpu: Option<Duration>,
+    /// Processor time of tracking, mapping on the same thread, and a detector of its own.
+    pub parts: Parts,
 }
 
 impl Pipeline {
-    /// A record of what `slam` will do; `detector_times` tell what its detector takes.
-    pub fn new(slam: Slam, detector_times: Option<Receiver<Took>>) -> Self {
+    /// Records what `slam` does, which maps on the calling thread or not; `detector_times` are those of its own detector.
+    pub fn new(slam: Slam, maps_inline: bool, detector_times: Option<Receiver<Took>>) -> Self {
         Self {
             slam,
             stages: Stages::default(),
@@ -73,7 +75,8 @@ impl Pipeline {
             resets: 0,
             made_keyframe: false,
             detector_times,
-            cpu: cpu::thread_time().map(|_| Duration::ZERO),
+            parts: Parts::default(),
+            maps_inline,
             started: Instant::now(),
             state: TrackingState::default(),
             best_start: (0, 0),
@@ -84,7 +87,6 @@ impl Pipeline {
     pub fn track(&mut self, frame: &RgbdFrame) -> TrackingState {
         let started = Instant::now();
         let (result, cpu) = cpu::timed(|| self.slam.track(frame));
-        self.add_cpu(cpu);
         self.made_keyframe = result.as_ref().is_ok_and(|tracked| tracked.is_keyframe);
         let tracked = match result {
             Ok(tracked) => tracked,
@@ -94,7 +96,9 @@ impl Pipeline {
             }
         };
         self.log(&tracked);
-        self.stages.push("frame", started.elapsed());
+        let wall = started.elapsed();
+        self.stages.push("frame", wall);
+        self.count_processor_time(cpu.unwrap_or_default(), wall, &tracked);
         self.note_times(&tracked);
         self.frames.count(tracked.state);
         self.dynamic.count(&self.slam);
@@ -124,6 +128,11 @@ impl Pipeline {
         &self.slam
     }
 
+    /// Counts processor time of the dense map.
+    pub fn add_dense(&mut self, took: Duration) {
+        self.parts.add(Part::Dense, took);
+    }
+
     /// Whether the last frame became a keyframe.
     pub fn made_keyframe(&self) -> bool {
         self.made_keyframe
@@ -149,7 +158,7 @@ impl Pipeline {
         let detections: Vec<_> = self.detector_times.iter().flat_map(Receiver::try_iter).collect();
         for took in detections {
             self.stages.push("detector", took.wall);
-            self.add_cpu(took.cpu);
+            self.parts.add(Part::Detector, took.cpu.unwrap_or_default());
         }
         if self.detector_times.is_some() {
             self.stages.push("detector idle", times.detector_wait);
@@ -164,8 +173,14 @@ impl Pipeline {
         }
     }
 
-    fn add_cpu(&mut self, took: Option<Duration>) {
-        self.cpu = self.cpu.zip(took).map(|(sum, took)| sum + took);
+    /// Divides the processor time of a frame between tracking and mapping in the ratio of their wall times.
+    fn count_processor_time(&mut self, cpu: Duration, wall: Duration, tracked: &Tracked) {
+        let times = &tracked.times;
+        let busy_s = wall.saturating_sub(times.detector_wait).as_secs_f64();
+        let mapping_s = if self.maps_inline { (times.mapping + times.places).as_secs_f64() } else { 0.0 };
+        let mapping = cpu.mul_f64((mapping_s / busy_s.max(1e-9)).clamp(0.0, 1.0));
+        self.parts.add(Part::Mapping, mapping);
+        self.parts.add(Part::Tracking, cpu.saturating_sub(mapping));
     }
 
     fn note_start(&mut self) {
@@ -221,7 +236,7 @@ impl Pipeline {
             recognition: self.recognition,
             stages: self.stages,
             wall,
-            cpu: self.cpu,
+            parts: self.parts,
         })
     }
 

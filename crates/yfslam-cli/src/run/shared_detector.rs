@@ -4,14 +4,13 @@
 
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
-use std::time::Duration;
 
 use anyhow::Result;
 use yfslam::image::Image;
 use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError, Upright, mask_of_classes};
 
 use crate::input::detector::{LoadedDetector, Took};
-use crate::stats::cpu;
+use crate::stats::process::{Part, Parts};
 use crate::stats::stages::Stages;
 
 /// A detector that processes each frame once for several methods; once for each roll angle where the methods estimate different ones.
@@ -40,19 +39,12 @@ struct FrameDetections {
 }
 
 /// The cost of detection for several methods.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct DetectionTally {
     pub stages: Stages,
-    /// Processor time; `None` where the system does not measure it.
-    pub cpu: Option<Duration>,
+    pub parts: Parts,
     /// Frames on which the detector failed; they count as frames without boxes.
     pub failures: usize,
-}
-
-impl Default for DetectionTally {
-    fn default() -> Self {
-        Self { stages: Stages::default(), cpu: cpu::thread_time().map(|_| Duration::ZERO), failures: 0 }
-    }
 }
 
 impl SharedDetector {
@@ -114,7 +106,7 @@ impl SharedDetector {
         let mask = self.upright.mask(&*self.detector).map(|mask| Arc::new(mask_of_classes(mask, &self.movable)));
         for took in self.times.try_iter() {
             self.tally.stages.push("detector", took.wall);
-            self.tally.cpu = self.tally.cpu.zip(took.cpu).map(|(sum, took)| sum + took);
+            self.tally.parts.add(Part::Detector, took.cpu.unwrap_or_default());
         }
         let detections = FrameDetections { boxes, mask };
         if let Some(known) = &mut self.detections {

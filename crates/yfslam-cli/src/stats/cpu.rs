@@ -1,19 +1,30 @@
-//! Processor time, which other work on the machine does not spoil.
+//! Processor time of this thread and of this process, which does not depend on other work on the machine.
 
 use std::time::Duration;
 
-/// Processor time that the calling thread has taken so far; `None` where the system does not tell.
+/// Returns the processor time of the calling thread so far; `None` where the system does not measure it.
 pub fn thread_time() -> Option<Duration> {
     #[cfg(unix)]
-    {
-        let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-        Some(Duration::new(time.tv_sec.try_into().ok()?, time.tv_nsec.try_into().ok()?))
-    }
+    return clock(rustix::time::ClockId::ThreadCPUTime);
     #[cfg(not(unix))]
     None
 }
 
-/// What `work` returns, and the processor time of this thread that it took.
+/// Returns the processor time of all threads of this process so far; `None` where the system does not measure it.
+pub fn process_time() -> Option<Duration> {
+    #[cfg(unix)]
+    return clock(rustix::time::ClockId::ProcessCPUTime);
+    #[cfg(not(unix))]
+    None
+}
+
+#[cfg(unix)]
+fn clock(id: rustix::time::ClockId) -> Option<Duration> {
+    let time = rustix::time::clock_gettime(id);
+    Some(Duration::new(time.tv_sec.try_into().ok()?, time.tv_nsec.try_into().ok()?))
+}
+
+/// Returns the result of `work`, and the processor time of this thread that it took.
 pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Option<Duration>) {
     let before = thread_time();
     let result = work();

@@ -1,6 +1,6 @@
 //! HTML pages.
 
 mod dense;
-pub mod page;
+mod page;
 mod tables;
 pub mod tables_page;

@@ -18,8 +18,15 @@ use yfslam_eval::{AlignmentKind, improvement_percent};
 /// The style sheet of all pages.
 const STYLE: &str = include_str!("style.css");
 
+impl Report<'_> {
+    /// Returns the page.
+    pub fn html(&self) -> String {
+        page(self).into_string()
+    }
+}
+
 /// The whole page.
-pub fn page(report: &Report) -> Markup {
+fn page(report: &Report) -> Markup {
     let scene = Scene::new(report);
     let content = html! {
         (header(report))
@@ -85,14 +92,13 @@ fn verdict(report: &Report) -> Markup {
         }
         @if report.truth.is_none() { "; how far off is not known, for there is no ground truth" }
         "."
-        @if let Some(ms) = ms_per_frame(method) {
-            span data-timing="" { " It takes " b { (format!("{ms:.1} ms")) } " of one processor core a frame." }
+        @if let Some(time) = &report.processor_time {
+            span data-timing="" {
+                @if report.methods.len() == 1 { " The process takes " } @else { " All methods together take " }
+                b { (format!("{:.1} ms", time.total_ms)) } " of processor time per frame."
+            }
         }
     }
-}
-
-fn ms_per_frame(method: &MethodReport) -> Option<f64> {
-    Some(method.times.cpu_s? * 1e3 / method.frames.total.max(1) as f64)
 }
 
 fn card(method: &MethodReport, place: usize) -> Markup {
@@ -279,13 +285,13 @@ fn times(report: &Report) -> Markup {
         section #times data-timing="" {
             h2 { "Time" }
             p.about {
-                "Wall time of each stage. Solid: median; light: 99 % of the runs took no longer. Detection runs beside feature extraction, \
-                 reading and rendering run ahead."
+                "Wall time of each stage. Solid: median; light: 99th percentile (p99). Detection runs in parallel with feature extraction; \
+                 images are read or rendered ahead of their use."
             }
             (tables::times(report))
             table.figures.totals {
                 thead {
-                    tr { th {} th { "wall time (s)" } th { "frames a second" } th { "processor time (s)" } th { "a frame (ms)" } }
+                    tr { th {} th { "wall time of tracking (s)" } th { "frames per second" } }
                 }
                 tbody {
                     @for (place, method) in report.methods.iter().enumerate() {
@@ -293,16 +299,14 @@ fn times(report: &Report) -> Markup {
                             th style=(format!("color:var({})", Ink::method(method.name, place).variable())) { (method.name) }
                             td { (format!("{:.2}", method.times.tracking_s)) }
                             td { (format!("{:.1}", method.frames.total as f64 / method.times.tracking_s.max(1e-9))) }
-                            td { (method.times.cpu_s.map_or("–".into(), |s| format!("{s:.2}"))) }
-                            td { (ms_per_frame(method).map_or("–".into(), |ms| format!("{ms:.2}"))) }
                         }
                     }
                 }
             }
             p.about {
-                "These are of tracking and detection alone. Everything together, reading or rendering included, took "
-                (format!("{:.2} s", report.wall_s)) "."
+                "Everything together, reading or rendering included, took " (format!("{:.2} s", report.wall_s)) "."
             }
+            @if let Some(time) = &report.processor_time { (tables::processor_time(time)) }
         }
     }
 }

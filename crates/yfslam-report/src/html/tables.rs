@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::content::{MethodReport, Report, Stage};
+use crate::content::{MethodReport, ProcessorTime, Report, Stage};
 use crate::figures::ink::Ink;
 use yfslam_eval::{Delta, Evaluation, Rpe, Statistics, improvement_percent};
 
@@ -143,7 +143,7 @@ pub fn times(report: &Report) -> Markup {
         div.scroll {
             table.figures.times {
                 thead {
-                    tr { th { "stage" } th {} th { "median (ms)" } th { "99 % within (ms)" } th { "runs" } th.bar {} }
+                    tr { th { "stage" } th {} th { "median (ms)" } th { "p99 (ms)" } th { "runs" } th.bar {} }
                 }
                 @for name in &stages {
                     tbody {
@@ -166,6 +166,22 @@ pub fn times(report: &Report) -> Markup {
                     }
                 }
             }
+        }
+    }
+}
+
+/// Processor time of a frame and what it consists of.
+pub fn processor_time(time: &ProcessorTime) -> Markup {
+    html! {
+        table.figures.totals {
+            thead { tr { th { "processor time per frame" } th { "ms" } } }
+            tbody {
+                @for (name, ms) in &time.parts { tr { th { (name) } td { (format!("{ms:.2}")) } } }
+                tr { th { b { "total" } } td { b { (format!("{:.2}", time.total_ms)) } } }
+            }
+        }
+        p.about {
+            "Processor time of the whole process, all threads together. The parts are measured separately; “other” is the rest, at least 0."
         }
     }
 }

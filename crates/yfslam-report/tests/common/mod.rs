@@ -30,8 +30,7 @@ pub fn method<'a>(
     evaluation: Option<&'a Evaluation>,
 ) -> MethodReport<'a> {
     let stage = |name: &str, ms: f64| Stage { name: name.into(), count: 9, median_ms: ms, p99_ms: 3.0 * ms };
-    let times =
-        Times { stages: vec![stage("features", 1.5), stage("mapping", 12.0)], tracking_s: 2.5, cpu_s: Some(2.0) };
+    let times = Times { stages: vec![stage("features", 1.5), stage("mapping", 12.0)], tracking_s: 2.5 };
     let frames = Frames { total: trajectory.len() + 90, tracked: trajectory.len(), lost: 90, skipped: Vec::new() };
     let picture = Picture { frame: 3, note: "", png: vec![0; 9], size: [4, 3], features: [8, 1] };
     let config = "seed = 0 # <&>\n".into();
@@ -61,6 +60,7 @@ pub fn report<'a>(
         methods,
         shared_stages: Vec::new(),
         wall_s: 3.0,
+        processor_time: None,
         version: "0",
         command: String::new(),
     }

@@ -71,8 +71,8 @@ pub struct Cell {
     pub rpe_second_std_deg: Option<f64>,
     /// Median wall time of each stage of the run, ms.
     pub stages_ms: BTreeMap<String, f64>,
-    /// Processor time of tracking and detection for a frame, ms.
-    pub cpu_ms_per_frame: Option<f64>,
+    /// Processor time of the process for a frame, without that of other methods in the same process, ms.
+    pub process_ms_per_frame: Option<f64>,
     /// As of its [`Group`].
     pub whole: bool,
     /// Why there are no figures.
@@ -97,7 +97,7 @@ impl Cell {
         let run: Value = serde_json::from_str(&text).unwrap_or_default();
         let figure = |place: &str| run.pointer(place).and_then(Value::as_f64);
         let ate_rmse_m = figure("/evaluation/ate/translation_m/rmse");
-        let frames = figure("/frames/read").filter(|frames| *frames > 0.0);
+        let other_methods_ms = figure("/process_parts_ms_per_frame/other_methods").unwrap_or(0.0);
         let own_failure = || Some(std::fs::read_to_string(folder.join(FAILURE_FILE)).ok()?.trim().to_owned());
         let failure = match run {
             Value::Null => own_failure().or_else(|| failure.map(str::to_owned)),
@@ -119,7 +119,7 @@ impl Cell {
             rpe_second_deg: figure("/evaluation/rpe/1/rotation_deg/rmse"),
             rpe_second_std_deg: figure("/evaluation/rpe/1/rotation_deg/std"),
             stages_ms: stages.filter_map(median).collect(),
-            cpu_ms_per_frame: figure("/cpu_s").zip(frames).map(|(cpu_s, frames)| 1e3 * cpu_s / frames),
+            process_ms_per_frame: figure("/process_ms_per_frame").map(|ms| ms - other_methods_ms),
             whole: group.whole,
             failure,
             arguments,

@@ -152,7 +152,7 @@ fn times(rows: &[Row]) -> TableSection {
         };
         let mut line = vec![method.to_owned()];
         line.extend(STAGES.iter().map(|(name, _)| median(&|cell| cell.stages_ms.get(*name).copied())));
-        line.push(median(&|cell| cell.cpu_ms_per_frame));
+        line.push(median(&|cell| cell.process_ms_per_frame));
         table.push(line);
     }
     let about = "Wall time on this machine: medians of the runs' medians, over all sequences and seeds. Methods run side by side, a thread \

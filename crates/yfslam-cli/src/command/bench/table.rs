@@ -81,7 +81,7 @@ pub fn overview(rows: &[Row]) -> Table {
 pub fn csv(cells: &[Cell]) -> String {
     let mut text =
         "sequence,method,seed,ate_rmse_m,ate_std_m,tracked,rpe_frame_m,rpe_second_m,rpe_second_std_m,rpe_second_deg,\
-                    rpe_second_std_deg,cpu_ms_per_frame,failure\n"
+                    rpe_second_std_deg,process_ms_per_frame,failure\n"
             .to_owned();
     for cell in cells {
         let figures = [
@@ -93,7 +93,7 @@ pub fn csv(cells: &[Cell]) -> String {
             cell.rpe_second_std_m,
             cell.rpe_second_deg,
             cell.rpe_second_std_deg,
-            cell.cpu_ms_per_frame,
+            cell.process_ms_per_frame,
         ];
         let figures = figures.map(|figure| figure.map_or(String::new(), |value| value.to_string())).join(",");
         let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
@@ -125,7 +125,7 @@ pub mod tests {
             rpe_second_deg: ate,
             rpe_second_std_deg: ate,
             stages_ms: [("frame".to_owned(), 12.5), ("detector".to_owned(), 7.0)].into(),
-            cpu_ms_per_frame: Some(20.0),
+            process_ms_per_frame: Some(20.0),
             whole: true,
             failure: ate.is_none().then(|| "no trajectory".into()),
             arguments: vec![],

@@ -12,6 +12,7 @@ use crate::output::recorder::{Recorder, ReportImages, RunOutputs};
 use crate::run::map_args::MapArgs;
 use crate::run::method_run::{EvalContext, MethodRun, RunResult};
 use crate::run::shared_detector::SharedDetector;
+use crate::stats::process::{ProcessMeter, ProcessTime};
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
 use crate::ui::progress::Progress;
@@ -91,15 +92,16 @@ impl RecordedRun {
     }
 }
 
-/// Takes all frames of the source through all runs, with a thread for each run. Returns the durations of reading.
+/// Takes all frames of the source through all runs, with a thread for each run. Returns the durations of reading, and the processor time.
 pub fn drive(
     source: &mut Source,
     mut detector: Option<&mut SharedDetector>,
     runs: &mut [RecordedRun],
     terminal: Terminal,
-) -> Stages {
+) -> (Stages, ProcessTime) {
     let mut progress = Progress::new(terminal, &source.name, source.stamps_ns.len());
     let mut reading = Stages::default();
+    let mut meter = ProcessMeter::start();
     while runs.iter().any(|run| run.failure.is_none())
         && let Some(frame) = source.frames.next(&mut reading)
     {
@@ -114,12 +116,13 @@ pub fn drive(
                 run.process(frame);
             }
         });
+        meter.frame();
         if let Some(RecordedRun { run, .. }) = runs.first() {
             progress.frame(run.pipeline.frames(), run.state);
         }
     }
     progress.finish();
-    reading
+    (reading, meter.finish())
 }
 
 /// Returns the frame for each run, with boxes from the shared detector, if there is one.

@@ -22,6 +22,7 @@ use crate::output::html;
 use crate::output::recorder::RunOutputs;
 use crate::output::report::{ReportedRun, RunReport};
 use crate::output::summary;
+use crate::run::cost::frame_costs;
 use crate::run::evaluation::EvaluationArgs;
 use crate::run::map_args::MapArgs;
 use crate::run::method_run::{EvalContext, RunResult};
@@ -132,7 +133,7 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let outputs = RunOutputs { overlay: args.overlay, snapshots };
     let setup = Setup { source: &source, config: &config, map: &args.map, outputs, makes_dense_map: args.dense };
     let (mut runs, mut shared) = setup.prepare(&methods, &out, detector)?;
-    let reading = drive(&mut source, shared.as_mut(), &mut runs, terminal);
+    let (reading, process) = drive(&mut source, shared.as_mut(), &mut runs, terminal);
 
     let detection = shared.map_or_else(DetectionTally::default, SharedDetector::into_tally);
     let (reading, truth) = (&reading, truth.as_ref());
@@ -140,11 +141,22 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let context =
         EvalContext { source: &source, truth, max_diff_ns, alignment, boxes: &boxes, reading, detection: &detection };
     let results = finish(runs, context, &args.map, terminal)?;
+    let only_results: Vec<&RunResult> = results.iter().map(|recorded| &recorded.result).collect();
+    let costs = frame_costs(&process, &detection, &only_results);
     let (sequence, faults) = (args.source.sequence.as_str(), args.source.faults.as_slice());
     let source = &source;
     let runs: Vec<ReportedRun> = results
         .iter()
-        .map(|RecordedResult { result, images, .. }| ReportedRun { sequence, source, faults, truth, result, images })
+        .zip(costs)
+        .map(|(RecordedResult { result, images, .. }, cost)| ReportedRun {
+            sequence,
+            source,
+            faults,
+            truth,
+            result,
+            images,
+            cost,
+        })
         .collect();
     for (run, RecordedResult { folder, .. }) in runs.iter().zip(&results) {
         let report = RunReport::new(run);
@@ -154,17 +166,16 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         }
     }
     let page = args.report.then(|| html::write(&out, &runs, &reading.and(&detection.stages))).transpose()?;
-    let results: Vec<&RunResult> = results.iter().map(|recorded| &recorded.result).collect();
     if methods.len() > 1 {
-        terminal.result(&summary::of_several(&results, source, truth))?;
-    } else if let Some(evaluation) = results.first().and_then(|result| result.evaluation()) {
+        terminal.result(&summary::of_several(&runs, truth))?;
+    } else if let Some(evaluation) = only_results.first().and_then(|result| result.evaluation()) {
         terminal.result(&format!("\n{}", evaluation_table(evaluation, TableStyle::Plain)))?;
     }
     terminal.result(&format!("\nwritten to {}\n", out.path().display()))?;
     if let Some(page) = page {
         terminal.result(&format!("report: {}\n", page.display()))?;
     }
-    check_accuracy(args, &results, terminal)
+    check_accuracy(args, &only_results, terminal)
 }
 
 impl RunArgs {

@@ -51,6 +51,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
         args.start,
         args.end.map_or("the end".to_owned(), |end| end.to_string())
     );
+    name_render_threads();
     let world = Arc::new(World::new(&config)?);
     let span = TimeMirror { first_ns: world.timestamp_ns(range.start), last_ns: world.timestamp_ns(range.end - 1) };
     let part = Part { range, mirror: args.reverse.then_some(span) };
@@ -70,6 +71,12 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
         truth_reader: None,
         masks: None,
     })
+}
+
+/// Names the threads that render, so that their processor time can be told from that of other threads.
+fn name_render_threads() {
+    // Fails only if the threads exist already, and then they stay as they are.
+    let _ = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("yfslam-render-{index}")).build_global();
 }
 
 /// The camera of a world.

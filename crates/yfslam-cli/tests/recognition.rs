@@ -16,14 +16,14 @@ use yfslam_io::write_atomically;
 const DESK: &str = "synth:sitting_xyz?people=0&width=320&height=240&frames=90";
 
 #[test]
-fn a_camera_that_was_blinded_is_found_again_within_ten_frames() {
+fn a_camera_that_was_covered_is_relocalised_within_ten_frames() {
     let folder = tempfile::tempdir().unwrap();
     let output = succeeds(folder.path(), &["run", DESK, "--fault", "black@1+1", "--out", "out"]);
-    assert!(output.stdout.contains("lost 1 times, found again 1 times"), "{}", output.stdout);
+    assert!(output.stdout.contains("lost 1 times, relocalised 1 times"), "{}", output.stdout);
     let report = report(&folder.path().join("out"));
-    let lost = &report["places"]["lost"][0];
+    let lost = &report["loops_and_relocalisation"]["lost"][0];
     let frames = lost["frames"].as_u64().unwrap();
-    assert!((30..=40).contains(&frames) && lost["found_again"] == true, "{lost}");
+    assert!((30..=40).contains(&frames) && lost["relocalised"] == true, "{lost}");
     assert!(ate_rmse(&report) < 0.015, "{}", ate_rmse(&report));
 }
 
@@ -34,7 +34,11 @@ fn a_camera_lost_at_a_corner_does_not_take_the_next_corridor_for_the_last() {
     succeeds(folder.path(), &["run", world, "--end", "275", "--out", "out", "-q"]);
     let report = report(&folder.path().join("out"));
     // Somebody hides the corner; after it doors and lamps are as they were before, 6 m and a right angle away.
-    assert_eq!(report["places"]["lost"][0]["from_ns"], 5_833_333_333_u64, "{}", report["places"]["lost"]);
+    assert_eq!(
+        report["loops_and_relocalisation"]["lost"][0]["from_ns"], 5_833_333_333_u64,
+        "{}",
+        report["loops_and_relocalisation"]["lost"]
+    );
     assert!(ate_rmse(&report) < 0.1, "{}", ate_rmse(&report));
 }
 
@@ -46,7 +50,7 @@ fn a_way_that_leads_back_closes_its_loop() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), &["run", AROUND, "--method", "none", "--out", "out", "-q"]);
     let report = report(&folder.path().join("out"));
-    let loops = report["places"]["loops"].as_array().unwrap();
+    let loops = report["loops_and_relocalisation"]["loops"].as_array().unwrap();
     assert!(loops.len() == 1 && loops[0]["merged_submaps"] == false, "{loops:?}");
     assert!(loops[0]["drift_m"].as_f64().unwrap() < 0.6, "{loops:?}");
     assert_eq!(report["frames"]["tracked"], 440);
@@ -60,9 +64,9 @@ fn a_camera_put_elsewhere_maps_on_and_joins_both_maps_where_they_meet() {
     let fault = ["--fault", "dropped@6+24"];
     succeeds(folder.path(), &[&["run", AROUND, "--method", "none", "--out", "out", "-q"], &fault[..]].concat());
     let report = report(&folder.path().join("out"));
-    let loops = report["places"]["loops"].as_array().unwrap();
+    let loops = report["loops_and_relocalisation"]["loops"].as_array().unwrap();
     assert!(loops.len() == 1 && loops[0]["merged_submaps"] == true, "{loops:?}");
-    assert_eq!(report["places"]["frames_apart"], 0);
+    assert_eq!(report["loops_and_relocalisation"]["frames_in_other_submaps"], 0);
     assert!(report["frames"]["tracked"].as_u64().unwrap() > 150);
     // Two worlds taken for one would be metres off.
     assert!(ate_rmse(&report) < 0.15, "{}", ate_rmse(&report));
