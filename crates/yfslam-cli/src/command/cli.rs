@@ -1,4 +1,4 @@
-//! The command line: one definition per flag, from which parsing, help and completions follow.
+//! The command line: parsing, help and completions follow from one definition of each option.
 
 use std::sync::LazyLock;
 
@@ -8,16 +8,16 @@ use crate::command::{bench, completions, config, demo, detect, eval, info, map, 
 use crate::input::detector::describe_embedded;
 use crate::ui::verbosity::Verbosity;
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
-  yfslam demo                                        what it does, on any machine, without data
-  yfslam run rgbd_bonn_crowd --camera bonn
-  yfslam detect photo.jpg --pictures
+  yfslam demo                                  compares methods, without data
+  yfslam run rgbd_bonn_crowd --camera bonn     tracks a sequence
+  yfslam detect photo.jpg --images             detects people
   yfslam eval groundtruth.txt yfslam-out/rgbd_bonn_crowd/trajectory.txt";
 
-/// RGB-D SLAM for scenes in which people walk: frames in, the camera's trajectory out.
+/// Visual SLAM for scenes with people: camera trajectory and map from RGB-D, stereo or monocular images.
 #[derive(Debug, Parser)]
-#[command(name = "yfslam", version, long_version = long_version(), after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "yfslam", version, long_version = long_version(), after_help = HELP, arg_required_else_help = true)]
 pub struct Cli {
     #[command(flatten)]
     pub verbosity: Verbosity,
@@ -25,7 +25,7 @@ pub struct Cli {
     pub command: Command,
 }
 
-/// The version, and which network is embedded.
+/// Returns the version and the embedded network.
 fn long_version() -> &'static str {
     static TEXT: LazyLock<String> = LazyLock::new(|| format!("{}\n{}", env!("CARGO_PKG_VERSION"), describe_embedded()));
     &TEXT

@@ -7,7 +7,7 @@ use clap_complete::Shell;
 use crate::command::cli::Cli;
 use crate::ui::terminal::print;
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
   yfslam completions bash > ~/.local/share/bash-completion/completions/yfslam
   yfslam completions zsh > ~/.zfunc/_yfslam
@@ -15,7 +15,7 @@ Examples:
 
 /// Print a completion script for a shell.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = HELP)]
 pub struct CompletionsArgs {
     /// The shell.
     pub shell: Shell,

@@ -1,7 +1,6 @@
-//! Where the boxes of movable objects come from, and one detector for several methods.
+//! Where the boxes of movable objects come from.
 //!
-//! In: what the user named. Out: for one method the detector itself, which then runs beside feature extraction; for several the frames
-//! with their boxes, found once.
+//! In: options of the user. Out: the origin of the boxes, and the detector if it is one.
 
 use std::fmt;
 
@@ -19,20 +18,20 @@ use crate::ui::terminal::Terminal;
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BoxOrigin {
-    /// The method needs none.
+    /// The method needs no boxes.
     None,
-    /// The synthetic world knows them.
+    /// The synthetic world.
     Renderer,
     /// The `boxes.json` of the folder.
     Folder,
-    /// None: masks tell what can move.
+    /// No boxes: masks show what can move.
     Masks,
     /// A network.
     Detector(ModelIdentity),
 }
 
 impl BoxOrigin {
-    /// Whether they come with the frames.
+    /// Returns whether boxes come with the frames.
     pub fn is_source(&self) -> bool {
         matches!(self, Self::Renderer | Self::Folder)
     }
@@ -41,19 +40,19 @@ impl BoxOrigin {
 impl fmt::Display for BoxOrigin {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::None => f.write_str("none needed"),
+            Self::None => f.write_str("not needed"),
             Self::Renderer => f.write_str("exact, from the renderer"),
             Self::Folder => f.write_str("exact, from the recording's boxes.json"),
-            Self::Masks => f.write_str("none; masks tell what can move"),
+            Self::Masks => f.write_str("none, no detector is running; masks show what can move"),
             Self::Detector(model) => model.fmt(f),
         }
     }
 }
 
-/// The origin of the boxes that `methods` need, and the detector if it is one.
+/// Returns the origin of the boxes that `methods` need, and the detector if it is one.
 ///
 /// # Errors
-/// The detector cannot be used, or there are masks alone and a method cannot use them.
+/// The detector cannot be used, or a method needs boxes and there are only masks.
 pub fn choose(
     args: &DetectorArgs,
     source: &SourceArgs,
@@ -68,23 +67,26 @@ pub fn choose(
         if let Some(method) = methods.iter().find(|method| matches!(method, Method::Boxes | Method::Yf)) {
             let (name, _) = describe(*method);
             bail!(
-                "method {name} works on boxes alone; add --detector embedded to find them, or leave it out of --method"
+                "method {name} needs boxes and cannot use masks; add --detector embedded, or leave it out of --method"
             );
         }
-        terminal.note("no --detector: the masks alone tell what can move");
+        terminal.warn(
+            "no detector is running: people are not detected, and only what the masks show is treated as movable; add --detector embedded \
+             to detect people",
+        );
         return Ok((BoxOrigin::Masks, None));
     }
     if args.detector.is_none() && source.is_synthetic() {
-        terminal.note("no --detector: the boxes of people come from the renderer, which knows them exactly");
+        terminal.note("no --detector: the boxes of people come from the renderer and are exact");
         return Ok((BoxOrigin::Renderer, None));
     }
-    if args.detector.is_none() && source.knows_boxes() {
+    if args.detector.is_none() && source.has_boxes() {
         terminal.note("no --detector: the boxes of people come from the folder's boxes.json");
         return Ok((BoxOrigin::Folder, None));
     }
     let loaded = detector::load_for(args, config)?;
     if args.detector.is_none() {
-        terminal.note("no --detector: people are found by the network in this program");
+        terminal.note("no --detector: people are detected by the network in this program");
     }
     Ok((BoxOrigin::Detector(loaded.identity.clone()), Some(loaded)))
 }

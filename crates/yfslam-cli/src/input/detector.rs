@@ -1,4 +1,4 @@
-//! The detector that the user named or that comes with the program, timed.
+//! Loading the detector, and timing it.
 
 use std::borrow::Cow;
 use std::convert::Infallible;
@@ -18,24 +18,22 @@ use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, Network, YoloFastestV2};
 
 use crate::stats::cpu;
 
-/// The word for the network that comes with the program.
+/// Name of the network in this program.
 const EMBEDDED: &str = "embedded";
-/// Digits of a hash in a line for people, who find the whole in `--version` and in the files.
+/// Digits of a hash in messages; the whole hash is in `--version` and in the files.
 const SHORT_HASH: usize = 12;
 
-/// Which network finds people.
+/// The network that detects people.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "System")]
 pub struct DetectorArgs {
-    /// Network that finds people: `embedded`, the one in this program, or a file, YOLO-FastestV2 as ONNX with its six raw outputs
-    /// [default: embedded; but in `run` the boxes of a synthetic world or a boxes.json].
+    /// Network that detects people: `embedded` or an ONNX file [default: embedded; in `run` the boxes of the sequence, if it has any].
     #[arg(long, value_name = "FILE.onnx|embedded")]
     pub detector: Option<Model>,
-    /// Names of the network's classes, in its order [default: those in the file, else those of COCO].
+    /// Class names of the network, in its order [default: the names in the file, else those of COCO].
     #[arg(long, value_name = "NAME,NAME", value_delimiter = ',', requires = "detector")]
     pub detector_classes: Vec<String>,
-    /// Compute most of the network with integers of 8 bits: a little less accurate; faster on processors with AVX-512 VNNI, much
-    /// slower on others.
+    /// Use 8-bit integers: slightly less accurate, faster on processors with AVX-512 VNNI and much slower on others.
     #[arg(long)]
     pub integers: bool,
 }
@@ -43,7 +41,7 @@ pub struct DetectorArgs {
 /// A network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Model {
-    /// The one in this program.
+    /// The network in this program.
     Embedded,
     File(PathBuf),
 }
@@ -56,18 +54,18 @@ impl FromStr for Model {
     }
 }
 
-/// Which model found the boxes.
+/// The model that was used.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModelIdentity {
-    /// The file, or `embedded`.
+    /// File, or `embedded`.
     pub file: PathBuf,
-    /// Its size.
+    /// Size of the file.
     pub bytes: usize,
     /// SHA-256 (FIPS 180-4) of the file, hexadecimal.
     pub sha256: String,
-    /// Number of classes it knows.
+    /// Number of classes.
     pub classes: usize,
-    /// Whether it computes with integers of 8 bits.
+    /// Whether it uses 8-bit integers.
     pub integers: bool,
 }
 
@@ -80,7 +78,7 @@ impl fmt::Display for ModelIdentity {
     }
 }
 
-/// Which network is in this program, in a line.
+/// Describes the network in this program in a line.
 pub fn describe_embedded() -> String {
     format!("embedded network: SHA-256 {}, {} kB", sha256(EMBEDDED_MODEL), EMBEDDED_MODEL.len().div_ceil(1000))
 }
@@ -89,23 +87,23 @@ fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// A detector ready to run.
+/// A detector that is ready to run.
 pub struct LoadedDetector {
     pub detector: Box<dyn Network>,
-    /// One for each image it has seen.
-    pub times: Receiver<Took>,
+    /// Durations, one for each image.
+    pub times: Receiver<DetectorTime>,
     pub identity: ModelIdentity,
 }
 
-/// How long one image took.
+/// Duration of the detection in one image.
 #[derive(Clone, Copy, Debug)]
-pub struct Took {
+pub struct DetectorTime {
     pub wall: Duration,
-    /// Processor time; `None` where the system does not tell.
+    /// Processor time; `None` where the system does not measure it.
     pub cpu: Option<Duration>,
 }
 
-/// Loads a network, set to report every box that the dynamic filter of `config` may use.
+/// Loads a network that reports all boxes that the dynamic filter of `config` may use.
 ///
 /// # Errors
 /// As [`load`].
@@ -120,10 +118,10 @@ pub fn load_for(args: &DetectorArgs, config: &Config) -> Result<LoadedDetector> 
     load(args, DetectorConfig { score_threshold, ..Default::default() })
 }
 
-/// Loads the network that was named, else the embedded one.
+/// Loads the requested network, else the embedded one.
 ///
 /// # Errors
-/// The file cannot be read, is no ONNX model, or holds another network.
+/// The file cannot be read, is not an ONNX model, or holds an unsupported network.
 pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetector> {
     let (class_names, integers) = (args.detector_classes.clone(), args.integers);
     let config = DetectorConfig { class_names, integers, ..config };
@@ -144,10 +142,10 @@ pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetecto
     Ok(LoadedDetector { detector: Box::new(Timed { network, times: sender }), times, identity })
 }
 
-/// Tells how long each image took.
+/// Measures the duration of each detection.
 struct Timed {
     network: Box<dyn Network>,
-    times: Sender<Took>,
+    times: Sender<DetectorTime>,
 }
 
 impl Detector for Timed {
@@ -158,8 +156,8 @@ impl Detector for Timed {
     fn detect(&mut self, image: &RgbImage, out: &mut Vec<Detection>) -> Result<(), DetectorError> {
         let started = Instant::now();
         let (result, cpu) = cpu::timed(|| self.network.detect(image, out));
-        // Whoever stopped listening does not need the time.
-        let _ = self.times.send(Took { wall: started.elapsed(), cpu });
+        // The receiver may be gone at the end of a run.
+        let _ = self.times.send(DetectorTime { wall: started.elapsed(), cpu });
         result
     }
 
@@ -179,8 +177,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hashes_are_those_of_other_programs() {
-        // FIPS 180-4's own example, and the empty message.
+    fn hashes_equal_those_of_the_standard() {
+        // The example of FIPS 180-4, and the empty message.
         assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
         assert_eq!(sha256(b""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
     }

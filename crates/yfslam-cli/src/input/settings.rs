@@ -1,4 +1,4 @@
-//! From a configuration file and flags to one configuration: flags win over the file, the file over the defaults.
+//! The configuration: flags override the file, and the file overrides the defaults.
 
 use std::path::PathBuf;
 
@@ -8,58 +8,57 @@ use yfslam::Config;
 use yfslam::dynamic::Method;
 use yfslam::dynamic::depth_group::Grouping;
 
-/// What can be set about the system.
+/// Settings of the system.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "System")]
 pub struct SettingsArgs {
-    /// How the depth group of a moving body is found [default: exact].
+    /// How the depth group of a person is found in a box [default: exact].
     #[arg(long, value_enum, value_name = "GROUPING")]
     pub grouping: Option<GroupingArg>,
-    /// Seed of every random draw [default: 0].
+    /// Seed of all random draws [default: 0].
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: Option<u64>,
-    /// Frames from one look of the detector to the next [default: 1]. Over those between, tracks are carried without boxes.
+    /// Run the detector on every N-th frame [default: 1]; tracks of people are predicted in between.
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
     pub detect_every: Option<u32>,
-    /// Use boxes when they are ready, perhaps some frames late: no frame waits for the detector once there is a map. For live use on
-    /// small boards, with --threaded; results then differ from run to run.
+    /// Do not wait for the detector: use boxes when they are ready, for live use with --threaded.
     #[arg(long)]
     pub detect_async: bool,
-    /// Settings that differ from the defaults; `yfslam config` prints them all.
-    #[arg(long, value_name = "FILE.toml")]
+    /// Configuration file with the settings that differ from the defaults; `yfslam config` prints all settings.
+    #[arg(short, long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
 }
 
-/// How moving things are kept out.
+/// Methods for dynamic scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MethodArg {
-    /// Every feature is trusted, as in ORB-SLAM2.
+    /// All features are trusted, as in ORB-SLAM2.
     None,
-    /// Every feature inside a box is dropped.
+    /// All features in boxes are dropped.
     Boxes,
-    /// YF-SLAM: inside a box the depth group of the body is dropped, the background stays.
+    /// YF-SLAM: in a box, features in the depth group of the person are dropped, those of the background are kept.
     Yf,
-    /// DS-SLAM: people are dropped in frames in which anything on them moves against the epipolar geometry.
+    /// DS-SLAM: people are dropped in frames in which a feature on them violates the epipolar geometry.
     Ds,
-    /// DynaSLAM: people are dropped, and whatever stands nearer than earlier keyframes allow.
+    /// DynaSLAM: people are dropped, and what is nearer than earlier keyframes have measured.
     Dyna,
-    /// DMS-SLAM: features that do not move like their neighbours are dropped; needs no boxes.
+    /// DMS-SLAM: features that do not move like their neighbours are dropped; it needs no boxes.
     Dms,
-    /// Outlines of bodies in depth are dropped, and whatever else has moved since earlier views.
+    /// Segmented people are dropped, and whatever else has moved since earlier frames.
     Full,
 }
 
-/// How the depth group of a moving body is found.
+/// How the depth group of a person is found.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum GroupingArg {
-    /// A search over all depths; the same for every seed.
+    /// A search over all depths, which does not depend on the seed.
     Exact,
-    /// The paper's Geometric Depth RANSAC, seeded.
+    /// The Geometric Depth RANSAC of the paper, which depends on the seed.
     Ransac,
 }
 
 impl MethodArg {
-    /// The method that is meant.
+    /// Returns the method.
     pub fn method(self) -> Method {
         match self {
             Self::None => Method::None,
@@ -73,23 +72,21 @@ impl MethodArg {
     }
 }
 
-/// Name of a method, as on the command line, and what it does.
+/// Returns the name of a method on the command line, and a description.
 pub fn describe(method: Method) -> (&'static str, &'static str) {
     match method {
-        Method::None => ("none", "every feature is trusted"),
+        Method::None => ("none", "all features are trusted"),
         Method::Boxes => ("boxes", "features in boxes of people are dropped"),
-        Method::Yf => ("yf", "people are kept out, what is behind them stays"),
-        Method::Ds => ("ds", "people are kept out while anything on them moves, as in DS-SLAM"),
-        Method::Dyna => {
-            ("dyna", "people and what stands where earlier keyframes saw farther are kept out, as in DynaSLAM")
-        }
+        Method::Yf => ("yf", "the depth group of a person is dropped, the background is kept"),
+        Method::Ds => ("ds", "moving people are dropped, as in DS-SLAM"),
+        Method::Dyna => ("dyna", "people and what is nearer than in earlier keyframes are dropped, as in DynaSLAM"),
         Method::Dms => ("dms", "features that do not move like their neighbours are dropped, as in DMS-SLAM"),
-        Method::Full => ("full", "outlines of people and of whatever has moved are kept out"),
+        Method::Full => ("full", "segmented people and whatever else has moved are dropped"),
     }
 }
 
 impl SettingsArgs {
-    /// The configuration that file and flags amount to.
+    /// Returns the configuration from file and flags.
     ///
     /// # Errors
     /// The file cannot be read, or holds an unknown key or a value of the wrong type.

@@ -17,23 +17,23 @@ use super::pipeline::Pipeline;
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Map")]
 pub struct MapArgs {
-    /// Begin in the map of an earlier run: it is extended once a place is recognised.
+    /// Load the map of an earlier run; it is extended after relocalisation in it.
     #[arg(long, value_name = "FILE")]
     pub load_map: Option<PathBuf>,
-    /// Leave the loaded map as it is, and find the camera in it.
-    #[arg(long, requires = "load_map", conflicts_with = "save_map")]
+    /// Only localise in the loaded map, without changing it.
+    #[arg(long, visible_alias = "localize", requires = "load_map", conflicts_with = "save_map")]
     pub localise: bool,
-    /// Write the map, for --load-map and, with --dense, for `yfslam map`. The file is written whole or not at all.
+    /// Save the map for --load-map and, with --dense, for `yfslam map`.
     #[arg(long, value_name = "FILE")]
     pub save_map: Option<PathBuf>,
-    /// Map on a thread of its own, as for a live camera: tracking never waits. Results then differ from run to run.
+    /// Run mapping on its own thread, for live use; results then differ from run to run.
     #[arg(long)]
     pub threaded: bool,
 }
 
 impl MapArgs {
-    /// The options that ask for something a run of several methods cannot do: each method makes its own map, on its own thread.
-    pub fn of_one_method(&self) -> Vec<&'static str> {
+    /// Returns the given options that a run of several methods cannot have, because each method makes its own map.
+    pub fn single_method_options(&self) -> Vec<&'static str> {
         let options = [
             ("--load-map", self.load_map.is_some()),
             ("--save-map", self.save_map.is_some()),
@@ -42,36 +42,36 @@ impl MapArgs {
         options.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect()
     }
 
-    /// On which thread maps are made.
+    /// Returns the thread on which mapping runs.
     pub fn execution(&self) -> Execution {
         if self.threaded { Execution::Threaded } else { Execution::Inline }
     }
 
-    /// A system that maps as was asked for.
+    /// Applies the options to `slam`.
     ///
     /// # Errors
-    /// The map cannot be read, is none, or was made with other settings or, to be extended, with another camera.
+    /// The file cannot be read, is not a map, or was made with other settings or, to be extended, with another camera.
     pub fn apply(&self, slam: Slam) -> Result<Slam> {
         let slam = slam.with_execution(self.execution())?;
         let Some(path) = &self.load_map else { return Ok(slam) };
         let map_use = if self.localise { MapUse::Localise } else { MapUse::Extend };
         let saved = decode(&read(path)?).with_context(|| format!("{} cannot be used as a map", path.display()))?;
-        slam.with_map(saved, map_use).with_context(|| format!("the map {} does not fit", path.display()))
+        slam.with_map(saved, map_use).with_context(|| format!("the map {} cannot be used here", path.display()))
     }
 
-    /// Proves before a long run that the map can be written after it.
+    /// Checks before a run that the map can be written after it.
     ///
     /// # Errors
-    /// It cannot.
+    /// The map cannot be written.
     pub fn check(&self) -> Result<()> {
         let Some(path) = &self.save_map else { return Ok(()) };
-        // A new file of another name: what stands at `path` stays until there is a map to take its place.
+        // Another name: an earlier map at `path` stays until it is replaced.
         let mut probe = path.clone().into_os_string();
         probe.push(".probe");
         let probe = PathBuf::from(probe);
         write_atomically(&probe, |_| Ok(()))
             .with_context(|| format!("the map {} cannot be written", path.display()))?;
-        // Left behind it does no harm.
+        // A probe that stays does no harm.
         let _ = std::fs::remove_file(probe);
         Ok(())
     }

@@ -14,7 +14,7 @@ use yfslam_io::StampedPose;
 use yfslam_io::time::format_stamp;
 use yfslam_io::write::PlyPoint;
 
-use crate::input::detector::Took;
+use crate::input::detector::DetectorTime;
 use crate::stats::cpu;
 use crate::stats::process::{Part, Parts};
 use crate::stats::recognition::RecognitionTally;
@@ -33,7 +33,7 @@ pub struct Pipeline {
     live: Vec<StampedPose>,
     resets: usize,
     made_keyframe: bool,
-    detector_times: Option<Receiver<Took>>,
+    detector_times: Option<Receiver<DetectorTime>>,
     parts: Parts,
     maps_inline: bool,
     started: Instant,
@@ -64,7 +64,7 @@ pub struct Outcome {
 
 impl Pipeline {
     /// Records what `slam` does, which maps on the calling thread or not; `detector_times` are those of its own detector.
-    pub fn new(slam: Slam, maps_inline: bool, detector_times: Option<Receiver<Took>>) -> Self {
+    pub fn new(slam: Slam, maps_inline: bool, detector_times: Option<Receiver<DetectorTime>>) -> Self {
         Self {
             slam,
             stages: Stages::default(),

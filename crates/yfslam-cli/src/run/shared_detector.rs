@@ -9,7 +9,7 @@ use anyhow::Result;
 use yfslam::image::Image;
 use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError, Upright, mask_of_classes};
 
-use crate::input::detector::{LoadedDetector, Took};
+use crate::input::detector::{DetectorTime, LoadedDetector};
 use crate::stats::process::{Part, Parts};
 use crate::stats::stages::Stages;
 
@@ -17,7 +17,7 @@ use crate::stats::stages::Stages;
 pub struct SharedDetector {
     detector: Box<dyn Detector>,
     upright: Upright,
-    times: Receiver<Took>,
+    times: Receiver<DetectorTime>,
     /// Indices of the classes that can move.
     movable: Vec<usize>,
     /// Detections in the current frame by roll angle, degrees; `None` if the detector skips this frame.

@@ -23,60 +23,59 @@ use crate::ui::command_line::command_line;
 use crate::ui::progress::Progress;
 use crate::ui::terminal::Terminal;
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
-  yfslam bench                                           the whole suite of synthetic worlds
+  yfslam bench                                           all worlds of the synthetic suite
   yfslam bench walking_xyz walking_rpy --methods none,yf --seeds 5
   yfslam bench rgbd_bonn_crowd --detector yolo-fastestv2.onnx --seeds 5 -- --camera bonn --grouping ransac
   yfslam bench walking_static --frames 150 -- --fault covered@2+1
-  yfslam bench DIR                                       every sequence in a folder of folders
-  yfslam bench --known DIR --methods none,yf,full        those of the TUM and Bonn dynamic sequences that are in it
+  yfslam bench DIR                                       all sequences in a folder of folders
+  yfslam bench --known DIR --methods none,yf,full        the dynamic sequences of TUM and Bonn in a folder
 
-In the output folder:
-  report.html  the paper's tables: errors with their improvement on none, times, frames tracked
-  table.md     the same as Markdown
-  tables/      each of them as CSV
-  cells.csv    every run
-  cells/       every cell as JSON; those that are there are not run again, unless program or options have changed
-  runs/        what each run left behind
+Files in the output folder:
+  report.html  tables of the paper: errors with their improvement on none, times, frames tracked
+  table.md     the same tables as Markdown
+  tables/      each table as CSV and as LaTeX
+  cells.csv    one line for each run
+  cells/       results of each run as JSON; existing ones are reused unless program or options have changed
+  runs/        output folders of the runs
 
-Figures that papers published stand beside whole recorded sequences of the names that TUM and Bonn gave them, marked as published.
+Published results:
+  If a whole recorded sequence of TUM or Bonn is run, results from papers are added to the tables, marked as published.
 
-One process takes a sequence with one seed through all methods at once, a thread for each.";
+Processes:
+  One process runs all methods on a sequence with one seed, with one thread for each method.";
 
-/// Run sequences with several methods and seeds, and tabulate the errors. Can be stopped, and goes on where it stopped.
+/// Run sequences with several methods and seeds, and write tables of the errors; an interrupted bench can be continued.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = HELP)]
 pub struct BenchArgs {
-    /// Folders in TUM or Bonn layout with ground truth, folders of such folders, or names of synthetic worlds [default: all worlds of
-    /// the suite].
+    /// Sequences in TUM or Bonn layout with ground truth, folders of such sequences, or synthetic worlds [default: all worlds].
     #[arg(value_name = "SEQUENCE")]
     sequences: Vec<String>,
-    /// Run those of the dynamic sequences of the TUM RGB-D benchmark and of the Bonn data set that are in this folder, and tell which
-    /// are missing and how to get them. Nothing is downloaded.
+    /// Run the dynamic sequences of TUM and Bonn in this folder, and list the missing ones; nothing is downloaded.
     #[arg(long, value_name = "DIR", conflicts_with = "sequences")]
     known: Option<PathBuf>,
     /// Methods to compare.
     #[arg(long, alias = "method", value_name = "METHOD,METHOD", value_delimiter = ',', default_value = "none,boxes,yf,full",
           value_parser = ["none", "boxes", "yf", "ds", "dyna", "dms", "full"])]
     methods: Vec<String>,
-    /// Number of seeds: of the world if it is synthetic, else of the method's random draws.
+    /// Number of seeds, of a synthetic world or else of the random draws of the method.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Number of frames of each sequence [default: all].
     #[arg(long, value_name = "N")]
     frames: Option<u32>,
-    /// Network that finds people, for methods that ask for boxes: `embedded` or a file [default: synthetic worlds and boxes.json tell, else
-    /// embedded].
+    /// Network that detects people: `embedded` or an ONNX file [default: the boxes of the sequence, else embedded].
     #[arg(long, value_name = "FILE.onnx|embedded")]
     detector: Option<PathBuf>,
-    /// Processes at a time; each uses about as many cores as there are methods.
+    /// Number of processes at the same time; each uses about as many cores as there are methods.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=256))]
     jobs: u16,
-    /// Where results go [default: yfslam-out/bench].
-    #[arg(long, value_name = "DIR")]
+    /// Output folder [default: yfslam-out/bench].
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Words for every `yfslam run`, after `--`.
+    /// Options of every `yfslam run`, after `--`.
     #[arg(last = true, value_name = "OPTIONS OF RUN")]
     extra: Vec<String>,
 }

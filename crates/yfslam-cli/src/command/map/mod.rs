@@ -21,74 +21,80 @@ use crate::output::dense::DENSE_FILE;
 use crate::stats::cpu;
 use crate::ui::terminal::Terminal;
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
   yfslam run rgbd_bonn_crowd --camera bonn --dense
   yfslam map yfslam-out/rgbd_bonn_crowd                              all products
   yfslam map yfslam-out/rgbd_bonn_crowd --octomap --grid --resolution 0.1
   yfslam run DIR --dense --save-map lab.map
-  yfslam map lab.map --cloud --out clouds --up 0,-1,0
+  yfslam map lab.map --cloud -o clouds --up 0,-1,0
 
-In the output folder:
-  cloud.ply, cloud.pcd      with --cloud, coloured points, one a voxel
-  above.png, corner.png     with --cloud, pictures of it
-  octomap.bt, octomap.ot    with --octomap, for OctoMap: free or occupied; log-odds
-  grid.pgm, grid.yaml       with --grid, for ROS's navigation
+Files in the output folder:
+  cloud.ply, cloud.pcd      with --cloud, coloured points, one for each occupied voxel
+  above.png, corner.png     with --cloud, images of the cloud
+  octomap.bt, octomap.ot    with --octomap, for OctoMap: free or occupied, and log-odds
+  grid.pgm, grid.yaml       with --grid, for the ROS navigation stack
   mesh.ply                  with --mesh, coloured triangles
-  background/               with --background, the keyframes with most people, as seen and without them, with depth (1/5000 m) and
-                            a mask of what is known
+  background/               with --background, the keyframes with most people: original image, image without people, depth image
+                            (1/5000 m) and mask of the known pixels
 
-If the run's detector knew more than what can move (`--detector` with the 80 classes of COCO, for example), the map knows what it shows:
-  cloud.ply, cloud.pcd      have the class of each point, 0 where it is unknown
-  classes.png               with --cloud, the picture from a corner, coloured by class
+Classes:
+  If the detector of the run knows classes beside movable objects, such as the 80 classes of COCO, the map has classes:
+  cloud.ply, cloud.pcd      also hold the class of each point, 0 where it is unknown
+  classes.png               with --cloud, an image coloured by class
   semantic.ot               with --octomap, the octree coloured by class
-  classes.json              the classes' numbers, names, colours, and how many voxels are of each
+  classes.json              numbers, names, colours and voxel counts of the classes
 
-The z-axis points up, x to the front of the first picture, y to its left (ROS, REP 103).";
+Up direction (--up):
+  level     from horizontal surfaces in the map, such as floor, tables and ceiling
+  camera    from the first image, which is assumed to be upright
+  X,Y,Z     a direction in the world of the run
 
-/// Make clouds, octrees, grids and meshes of what a run with --dense has seen, without people.
+Coordinates:
+  z points up, x to the front of the first image, y to its left (ROS, REP 103).";
+
+/// Make point clouds, octrees, grids and meshes without people from the dense map of a run.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = HELP)]
 pub struct DenseMapArgs {
-    /// The output folder of a run with --dense, its `dense.map`, or the map that it saved (--save-map).
+    /// Output folder of a run with --dense, its `dense.map`, or its saved map (--save-map).
     #[arg(value_name = "RUN|MAP")]
     run: PathBuf,
-    /// Coloured point cloud.
+    /// Write a coloured point cloud.
     #[arg(long, help_heading = "Products")]
     cloud: bool,
-    /// Occupancy octree for OctoMap.
+    /// Write an occupancy octree for OctoMap.
     #[arg(long, help_heading = "Products")]
     octomap: bool,
-    /// Grid to drive in, for ROS's navigation.
+    /// Write an occupancy grid for the ROS navigation stack.
     #[arg(long, help_heading = "Products")]
     grid: bool,
-    /// Mesh of the surfaces.
+    /// Write a mesh of the surfaces.
     #[arg(long, help_heading = "Products")]
     mesh: bool,
-    /// What some keyframes saw, with the people painted over by what is behind them.
+    /// Write images of some keyframes in which people are replaced by the background.
     #[arg(long, help_heading = "Products")]
     background: bool,
     /// Side of a voxel, m, from 0.01 to 0.2 [default: 0.05].
     #[arg(long, value_name = "M", help_heading = "Map")]
     resolution: Option<f32>,
-    /// Depth beyond which readings make no surface, m [default: 4].
+    /// Largest depth of measurements that make surfaces, m [default: 4].
     #[arg(long, value_name = "M", help_heading = "Map")]
     max_range: Option<f32>,
-    /// Settings that differ from the defaults, in the section `dense`; `yfslam config` prints them all.
-    #[arg(long, value_name = "FILE.toml", help_heading = "Map")]
+    /// Configuration file; its section `dense` is used.
+    #[arg(short, long, value_name = "FILE.toml", help_heading = "Map")]
     config: Option<PathBuf>,
-    /// Which way is up: `level` (as floors, tables and ceilings say), `camera` (upright in the first picture), or a direction X,Y,Z of
-    /// the run's world.
+    /// Up direction: `level`, `camera`, or X,Y,Z.
     #[arg(long, value_name = "UP", default_value = "level", allow_hyphen_values = true, help_heading = "Map")]
     up: Up,
     /// Heights above the floor between which the grid has obstacles, m.
     #[arg(long, value_name = "LOW,HIGH", default_value = "0.1,1.8", help_heading = "Map")]
     band: HeightBand,
-    /// Height of the floor along the up direction, m, the first camera's being 0 [default: as the map shows it].
+    /// Height of the floor along the up direction relative to the first camera, m [default: from the map].
     #[arg(long, value_name = "M", allow_negative_numbers = true, help_heading = "Map")]
     floor: Option<f32>,
-    /// Where the files go [default: `map` in the output folder, or beside the map].
-    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    /// Output folder [default: `map` in the output folder of the run, or beside the map].
+    #[arg(short, long, value_name = "DIR", help_heading = "Output")]
     out: Option<PathBuf>,
 }
 

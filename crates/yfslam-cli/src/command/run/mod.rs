@@ -29,53 +29,67 @@ use crate::run::method_run::{EvalContext, RunResult};
 use crate::run::shared_detector::{DetectionTally, SharedDetector};
 use crate::ui::terminal::{Terminal, explain};
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
   yfslam run rgbd_bonn_crowd --camera bonn
   yfslam run rgbd_dataset_freiburg1_xyz --camera tum1 --method none
-  yfslam run 'synth:walking_xyz?seed=7&frames=300' --out walk      no data needed
-  yfslam run synth:walking_rpy --method none,boxes,yf --report     side by side
+  yfslam run 'synth:walking_xyz?seed=7&frames=300' -o walk         needs no data
+  yfslam run synth:walking_rpy --method none,boxes,yf --report     several methods and a report
   yfslam run DIR --start 100 --end 400 --reverse --overlay --report
-  yfslam run DIR --save-map lab.map                    then, another day:
-  yfslam run OTHER --load-map lab.map --localise
-  yfslam run DIR --dense --save-map lab.map            with surfaces, for `yfslam map lab.map`
-  yfslam run DIR --masks DIR/masks                     what can move, from a segmentation of your own
-  yfslam run DIR --sensor mono                         one picture a frame, no depth
-  yfslam run DIR --detect-every 3                      the network looks at every third frame
+  yfslam run DIR --save-map lab.map                                saves the map
+  yfslam run OTHER --load-map lab.map --localise                   localises in it
+  yfslam run DIR --dense --save-map lab.map                        adds a dense map, for `yfslam map lab.map`
+  yfslam run DIR --masks DIR/masks                                 uses your own segmentation
+  yfslam run DIR --sensor mono                                     uses the colour images only
+  yfslam run DIR --detect-every 3                                  runs the detector on every third frame
   yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
 
-In the output folder:
-  trajectory.txt  all tracked frames, poses as known at the end, world from camera (TUM format)
-  keyframes.txt   the keyframes of the map, likewise
-  live.txt        all tracked frames, poses as known at their time
+Files in the output folder:
+  trajectory.txt  final poses of all tracked frames, world from camera (TUM format)
+  keyframes.txt   final poses of the keyframes
+  live.txt        poses of all tracked frames as estimated at the time of each frame
   map.ply         landmarks with colour
-  run.json        what was run, what became of the frames, times, errors
-  config.toml     every setting of this run; give it to --config to repeat it
-  dense.map       with --dense, what `yfslam map` makes clouds, octrees, grids and meshes of
-  overlay/        with --overlay, one picture a frame
-  report.html     with --report, all of it on one page: figures, pictures, tables
+  run.json        input, counts of frames, times, errors
+  config.toml     the configuration of this run; --config repeats the run with it
+  dense.map       with --dense, the input of `yfslam map`
+  overlay/        with --overlay, one image for each frame
+  report.html     with --report, one page with errors, figures, images and times
 
-A single camera (--sensor mono) knows no lengths: the median depth of its first landmarks is 1, errors are those after alignment by Sim(3).
-It begins its map when it has moved aside, and so it does again when lost where it recognises nothing. Loops correct its scale, too.
+Detections:
+  The methods boxes, yf, ds, dyna and full need the bounding boxes of people. Without --detector, boxes come from the synthetic world or
+  from the file boxes.json in the folder, else from the network in this program. With --masks alone, no detector is running.
 
-Of several methods each has a folder of its own in the output folder, OUT/none and so on, and report.html compares them. Each frame is
-read or rendered once, and the network looks at it once; results are those of a run of each method alone. A method that fails leaves a
-failure.txt and does not stop the others.
+Masks (--masks):
+  One PNG image for each colour image, with the same name or named by its time stamp, or listed in `masks.txt` in the folder.
+  Pixels with the value 0 belong to no movable object. The methods ds, dyna and full use masks, and then need no boxes.
 
-Ends with success only if a trajectory was produced, by one method at least.";
+Several methods:
+  Each method has its own folder in the output folder, such as OUT/none. Each frame is read and searched for people once; the results
+  equal those of separate runs. If a method fails, its folder has a file failure.txt, and the other methods continue.
+
+A single camera (--sensor mono):
+  The scale is unknown: the median depth of the first landmarks is 1. Errors are computed after alignment with scale, Sim(3). The map
+  is initialised after sideways motion of the camera, and again when the camera is lost and not relocalised. Loop closing corrects drift
+  of the scale.
+
+Kinds of faults (--fault):
+  dropped, repeated, blank, black, frozen, late, depth-dropout, nan-stamp, covered
+
+Exit status:
+  Success if at least one method produced a trajectory.";
 
 /// Evenly spread snapshots in the report of one method.
 const SNAPSHOTS: usize = 5;
 /// The same for each of several methods.
 const SNAPSHOTS_OF_EACH: usize = 3;
 
-/// Track a sequence: its trajectory, map and report go to a folder.
+/// Track a sequence; trajectory, map and report are written to a folder.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = HELP)]
 pub struct RunArgs {
     #[command(flatten)]
     source: SourceArgs,
-    /// How moving things are kept out [default: full]. Several methods are run side by side; the others are compared with the first.
+    /// Methods for dynamic scenes [default: full]; with several methods, the others are compared with the first one.
     #[arg(
         long = "method",
         alias = "methods",
@@ -91,20 +105,19 @@ pub struct RunArgs {
     detector: DetectorArgs,
     #[command(flatten)]
     map: MapArgs,
-    /// Where results go [default: yfslam-out/NAME, the name of the sequence].
-    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    /// Output folder [default: yfslam-out/NAME, the name of the sequence].
+    #[arg(short, long, value_name = "DIR", help_heading = "Output")]
     out: Option<PathBuf>,
-    /// Write a picture of each frame: boxes yellow, moving regions red, static features green, dynamic ones red.
+    /// Write an image of each frame with boxes (yellow), moving regions (red), static features (green) and dynamic features (red).
     #[arg(long, help_heading = "Output")]
     overlay: bool,
-    /// Make a dense map on the way: `dense.map`, for `yfslam map`.
+    /// Make a dense map, `dense.map`, for `yfslam map`.
     #[arg(long, help_heading = "Output")]
     dense: bool,
-    /// Write `report.html`: errors, trajectory, pictures and times on one page that needs no network.
+    /// Write `report.html`, a page with errors, figures, images and times.
     #[arg(long, help_heading = "Output")]
     report: bool,
-    /// True trajectory to judge the result by, in TUM format or that of the folder's layout [default: groundtruth.txt, or EuRoC's or
-    /// KITTI's own, if it is there]. The estimator never sees it.
+    /// Ground truth, in TUM format or in the format of the folder [default: the ground truth in the folder].
     #[arg(long, value_name = "FILE", help_heading = "Evaluation")]
     groundtruth: Option<PathBuf>,
     #[command(flatten)]
@@ -116,7 +129,8 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let methods = args.methods(&config)?;
     let max_diff_ns = args.evaluation.max_diff_ns()?;
     let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
-    let mut source = args.source.open(config.depth.source, boxes.is_source().then_some(&*config.dynamic.movable))?;
+    let mut source =
+        Source::open(&args.source, config.depth.source, boxes.is_source().then_some(&*config.dynamic.movable))?;
     config.depth.source = source.depth_source;
     ensure!(
         !args.dense || config.depth.source == DepthSource::Image,
@@ -179,16 +193,16 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
 }
 
 impl RunArgs {
-    /// What the words after `yfslam` ask for, for commands that are a run.
+    /// Parses arguments of `yfslam run`, for other commands.
     ///
     /// # Errors
-    /// `yfslam run` would refuse them.
-    pub fn of_words(words: &[OsString]) -> Result<Self> {
+    /// `yfslam run` would refuse the arguments.
+    pub fn parse(arguments: &[OsString]) -> Result<Self> {
         let command = Self::augment_args(Command::new("yfslam run").no_binary_name(true));
-        Ok(Self::from_arg_matches(&command.try_get_matches_from(words)?)?)
+        Ok(Self::from_arg_matches(&command.try_get_matches_from(arguments)?)?)
     }
 
-    /// The methods that were asked for, each once; else that of the configuration.
+    /// Returns the requested methods, each once; else the method of the configuration.
     fn methods(&self, config: &Config) -> Result<Vec<Method>> {
         let mut methods: Vec<Method> = Vec::new();
         for method in self.methods.iter().map(|m| m.method()) {
@@ -201,12 +215,12 @@ impl RunArgs {
         }
         ensure!(
             !config.dynamic.detect_async || self.map.threaded,
-            "--detect-async (dynamic.detect_async) is for live use, whose results differ from run to run; add --threaded"
+            "--detect-async (dynamic.detect_async) is for live use, with results that differ from run to run; add --threaded"
         );
-        let options = self.map.of_one_method();
+        let options = self.map.single_method_options();
         ensure!(
             methods.len() == 1 || options.is_empty(),
-            "{} cannot be used with several methods, each of which makes a map of its own; give one --method",
+            "{} cannot be used with several methods, because each method makes its own map; give one --method",
             options.join(" and ")
         );
         Ok(methods)

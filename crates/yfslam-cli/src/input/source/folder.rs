@@ -15,20 +15,22 @@ use yfslam_io::{
     load_camera,
 };
 
+use super::Source;
+use super::args::SourceArgs;
+use super::frames::{FolderExtras, Frames, Player};
 use super::masks::Masks;
-use super::{FolderKnowledge, Frames, Player, Source, SourceArgs};
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
 
-/// Frames of the whole sequence that are tried where the first ones are unusable.
+/// Number of frames, spread over the sequence, that are checked if the first ones are unusable.
 const PROBES: usize = 30;
 
-/// Opens the folder, finds its camera and checks both against the first frames; reads its boxes of the classes that `own_boxes` names.
+/// Opens the folder with its camera, checks both against the first frames, and reads boxes of the classes `own_boxes`.
 pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Source> {
     let (sequence, camera) = open_sequence(args, configured)?;
     let camera = camera?;
     if !camera.unused_keys.is_empty() {
-        tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "not used of the camera file");
+        tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "keys of the camera file that are not used");
     }
     check(&sequence, &camera.camera)?;
     let boxes = match own_boxes {
@@ -38,13 +40,13 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let masks = args.masks.as_deref().map(|folder| Masks::open(folder, &sequence, &camera.camera)).transpose()?;
     let tally = masks.as_ref().map(|masks| masks.tally.clone());
     let stream = FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?;
-    let known = FolderKnowledge { boxes, mirror: sequence.mirror, masks };
+    let extras = FolderExtras { boxes, mirror: sequence.mirror, masks };
     let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();
     Ok(Source {
         name: name(args),
         camera,
         depth_source: sequence.depth_source,
-        frames: Frames::new(Player::Folder(stream, Box::new(known)), sequence.depth_source, args, &stamps_ns),
+        frames: Frames::new(Player::Folder(stream, Box::new(extras)), sequence.depth_source, args, &stamps_ns),
         stamps_ns,
         association: Some(sequence.report),
         truth_reader: Some(sequence.truth),
@@ -53,8 +55,8 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     })
 }
 
-/// Checks camera and depth factor against the first frames or, where those are unusable, against frames of the whole sequence: a
-/// sensor may wake up late.
+/// Checks camera and depth factor against the first frames or, if those are unusable, against frames of the whole sequence: some sensors
+/// deliver unusable frames at the start.
 fn check(sequence: &Sequence, camera: &Camera) -> Result<()> {
     let Err(error) = check_recording(sequence, camera) else { return Ok(()) };
     let step = sequence.entries.len().div_ceil(PROBES).max(1);
@@ -65,11 +67,11 @@ fn check(sequence: &Sequence, camera: &Camera) -> Result<()> {
     }
 }
 
-/// Reads the lists of the folder for what `configured` says of depth, if no flag does, and the camera: the one that was asked for, or the
-/// folder's.
+/// Reads the lists of the folder, and the camera: the requested one, or that of the folder. Depth comes from `configured` unless a flag
+/// says otherwise.
 ///
 /// # Errors
-/// A tolerance that is none, or a folder without usable lists.
+/// The tolerance is negative or not a number, or the folder has no usable lists.
 pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequence, Result<CameraSource>)> {
     let tolerance_ms = args.association_tolerance;
     ensure!(
@@ -85,7 +87,7 @@ pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequ
     };
     let mut sequence = Sequence::open(args.folder(), &options)?;
     if args.camera.is_some() {
-        // Pictures are taken to be of that camera as they are.
+        // The images are taken as they are: the calibration of the folder does not apply to another camera.
         sequence.calibration = None;
     }
     let camera = camera(args, &sequence);
@@ -106,30 +108,31 @@ fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
     Ok(source)
 }
 
-/// The folder's own name, also for `.` and the like.
+/// Returns the name of the folder, also for `.` and similar paths.
 fn name(args: &SourceArgs) -> String {
     let folder = args.folder().canonicalize().unwrap_or_else(|_| args.folder().into());
     folder.file_name().map_or("sequence".into(), |name| name.to_string_lossy().into_owned())
 }
 
-pub fn next(stream: &mut FrameStream, known: &FolderKnowledge, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
+/// Returns the next frame with its boxes and its mask.
+pub fn next(stream: &mut FrameStream, extras: &FolderExtras, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
     let before = stream.times();
     let frame = stream.next()?;
     let after = stream.times();
     stages.push("decode color", after.color - before.color);
-    let companion = after.companion - before.companion;
+    let paired = after.companion - before.companion;
     match stream.companion() {
-        DepthSource::Image => stages.push("decode depth", companion),
-        DepthSource::Stereo => stages.push("decode right", companion),
+        DepthSource::Image => stages.push("decode depth", paired),
+        DepthSource::Stereo => stages.push("decode right", paired),
         DepthSource::Motion => {}
     }
     stages.push("decode wait", after.waited - before.waited);
     let frame = frame.map_err(|error| Skip { reason: reason(&error.fault), message: error.to_string() });
-    Some(frame.and_then(|frame| known.add_to(frame, stages)))
+    Some(frame.and_then(|frame| extras.add_to(frame, stages)))
 }
 
-impl FolderKnowledge {
-    /// The frame with its boxes and its mask.
+impl FolderExtras {
+    /// Adds boxes and mask to the frame.
     fn add_to(&self, frame: RgbdFrame, stages: &mut Stages) -> Result<RgbdFrame, Skip> {
         let detections = self.boxes.as_ref().map(|boxes| self.boxes_at(boxes, frame.timestamp_ns));
         let started = Instant::now();
@@ -143,14 +146,14 @@ impl FolderKnowledge {
         Ok(RgbdFrame { detections, mask, ..frame })
     }
 
-    /// The boxes of the frame that is played at this time; none if the file does not list it.
+    /// Returns the boxes of the frame that is played at this time; none if the file does not list it.
     fn boxes_at(&self, boxes: &KnownDetections, played_ns: i64) -> Vec<Detection> {
         let recorded_ns = self.mirror.map_or(played_ns, |mirror| mirror.apply(played_ns));
         boxes.get(&recorded_ns).cloned().unwrap_or_default()
     }
 }
 
-/// The kind of fault, for counting.
+/// Returns the kind of fault, for counting.
 fn reason(fault: &FrameFault) -> &'static str {
     match fault {
         FrameFault::Unreadable(Error::Read { source, .. }) if source.kind() == ErrorKind::NotFound => "missing file",

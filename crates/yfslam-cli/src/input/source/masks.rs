@@ -1,7 +1,7 @@
-//! Masks of movable objects that some segmentation left in a folder, one image a frame.
+//! Masks of movable objects from a segmentation of the user's, one image for each frame.
 //!
-//! In: the folder and the frames of a sequence. Out: the mask of each frame that has one. A mask is named like the colour image of its
-//! frame, or by the frame's time, or it is listed in the folder's `masks.txt` as TUM lists are: time and file.
+//! In: the folder and the frames of a sequence. Out: the mask of each frame that has one. A mask has the name of the colour image or of
+//! the time stamp, or it is listed in `masks.txt` of the folder in the form of TUM lists: time stamp and file.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use yfslam_io::time::format_stamp;
 
 use crate::stats::skip::Skip;
 
-/// A list that a folder of masks may have.
+/// Name of the list of masks.
 const LIST: &str = "masks.txt";
 
 /// Which frames have a mask.
@@ -26,27 +26,27 @@ const LIST: &str = "masks.txt";
 pub struct MaskTally {
     /// The folder.
     pub folder: PathBuf,
-    /// Frames that have one.
+    /// Frames with a mask.
     pub found: usize,
-    /// Frames that have none; nothing is masked in them.
+    /// Frames without a mask; nothing is masked in them.
     pub missing: usize,
-    /// Where the first of those was looked for.
+    /// The file that is missing for the first of those.
     pub first_missing: Option<PathBuf>,
 }
 
 /// The masks of a sequence.
 pub struct Masks {
-    /// By the time at which the frame is played, ns.
+    /// By the time stamp at which the frame is played, ns.
     files: BTreeMap<i64, PathBuf>,
     size: ImageSize,
     pub tally: MaskTally,
 }
 
 impl Masks {
-    /// Finds the masks of the frames of `sequence` in `folder`, and reads the first.
+    /// Finds the masks of the frames of `sequence` in `folder`, and reads the first one.
     ///
     /// # Errors
-    /// The folder has none of them, its list is malformed, or the first cannot be used.
+    /// The folder has no mask of these frames, its list is malformed, or the first mask cannot be used.
     pub fn open(folder: &Path, sequence: &Sequence, camera: &Camera) -> Result<Self> {
         ensure!(folder.is_dir(), "--masks {}: there is no such folder; check the path", folder.display());
         let listed = read_list(folder)?;
@@ -70,8 +70,8 @@ impl Masks {
         let tally = MaskTally { folder: folder.into(), found, missing: sequence.entries.len() - found, first_missing };
         ensure!(
             found > 0,
-            "--masks {}: none of the {} frames has a mask there; name each like its colour image (the first is looked for as {}), or \
-             list time and file in {LIST}",
+            "--masks {}: none of the {} frames has a mask there; give each mask the name of its colour image (the first would be {}), or list \
+             time stamp and file in {LIST}",
             folder.display(),
             tally.missing,
             tally.first_missing.as_deref().unwrap_or(folder).display()
@@ -84,10 +84,10 @@ impl Masks {
         Ok(masks)
     }
 
-    /// The mask of the frame that is played at this time, if it has one.
+    /// Returns the mask of the frame that is played at this time, if it has one.
     ///
     /// # Errors
-    /// Its file cannot be used.
+    /// The file cannot be used.
     pub fn at(&self, played_ns: i64) -> Result<Option<Arc<Image<u8>>>, Skip> {
         let Some(path) = self.files.get(&played_ns) else { return Ok(None) };
         let skip = |error: anyhow::Error| Skip { reason: "unusable mask", message: format!("{error:#}") };
@@ -102,7 +102,7 @@ impl Masks {
     }
 }
 
-/// Files by time, ns, if the folder has a list.
+/// Returns files by time stamp, ns, if the folder has a list.
 fn read_list(folder: &Path) -> Result<Option<BTreeMap<i64, PathBuf>>> {
     let path = folder.join(LIST);
     if !path.is_file() {

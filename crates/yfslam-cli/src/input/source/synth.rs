@@ -1,4 +1,4 @@
-//! The synthetic world, rendered on a thread of its own, a few frames ahead of their use.
+//! The synthetic world, rendered on threads of its own, a few frames ahead of their use.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,13 +14,15 @@ use yfslam_io::CameraSource;
 use yfslam_io::time::TimeMirror;
 use yfslam_synth::{CLASS_NAMES, World, WorldConfig};
 
-use super::{Frames, Player, Source, SourceArgs, Truth};
+use super::args::SourceArgs;
+use super::frames::{Frames, Player};
+use super::{Source, Truth};
 use crate::stats::stages::Stages;
 
-/// Frames that wait rendered for the caller.
+/// Frames that are rendered ahead.
 const LOOK_AHEAD: usize = 4;
 
-/// Plays a part of a world, forward or backward.
+/// Plays a part of a world, forward or in reverse.
 pub struct Renderer {
     world: Arc<World>,
     part: Part,
@@ -36,7 +38,7 @@ struct Part {
     mirror: Option<TimeMirror>,
 }
 
-/// Builds the world that the spec names and starts to render it.
+/// Builds the world and starts to render it.
 pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Source> {
     let mut config = args.world()?;
     let offered = if config.stereo_m > 0.0 { DepthSource::Stereo } else { DepthSource::Image };
@@ -46,7 +48,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let range = args.start..args.end.unwrap_or(count).min(count);
     ensure!(
         !range.is_empty(),
-        "{}: frames {} to {} of its {count} frames are none; choose a smaller start or a larger end",
+        "{}: there are no frames from {} to {}, for it has {count} frames; choose a smaller start or a larger end",
         args.sequence,
         args.start,
         args.end.map_or("the end".to_owned(), |end| end.to_string())
@@ -57,8 +59,9 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let part = Part { range, mirror: args.reverse.then_some(span) };
     let stamps_ns: Vec<i64> = part.indices().map(|index| part.stamp_ns(&world, index)).collect();
     let (name, _) = yfslam_synth::split(&args.sequence);
-    let known = own_boxes.unwrap_or_default();
-    let classes = (0..CLASS_NAMES.len()).filter(|&class| known.iter().any(|name| name == CLASS_NAMES[class])).collect();
+    let wanted = own_boxes.unwrap_or_default();
+    let classes =
+        (0..CLASS_NAMES.len()).filter(|&class| wanted.iter().any(|name| name == CLASS_NAMES[class])).collect();
     let renderer = Renderer::start(world, part.clone(), classes)?;
     Ok(Source {
         name: name.into(),
@@ -79,13 +82,13 @@ fn name_render_threads() {
     let _ = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("yfslam-render-{index}")).build_global();
 }
 
-/// The camera of a world.
+/// Returns the camera of a world.
 pub fn world_camera(config: &WorldConfig) -> CameraSource {
     CameraSource { camera: config.camera.clone(), origin: "synthetic world".into(), unused_keys: Vec::new() }
 }
 
 impl Part {
-    /// Indices into the world, in the order in which they are played.
+    /// Returns the indices of frames in the order in which they are played.
     fn indices(&self) -> impl Iterator<Item = usize> + use<> {
         let Range { start, end } = self.range;
         let reverse = self.mirror.is_some();
@@ -99,7 +102,7 @@ impl Part {
 }
 
 impl Renderer {
-    /// Starts to render; of the boxes only those of `classes` are kept.
+    /// Starts to render; only boxes of `classes` are kept.
     fn start(world: Arc<World>, part: Part, classes: Vec<usize>) -> Result<Self> {
         let (sender, frames) = sync_channel(LOOK_AHEAD);
         let (rendered, played) = (world.clone(), part.clone());
@@ -109,7 +112,7 @@ impl Renderer {
                 let mut frame = rendered.frame(index).frame;
                 frame.detections.iter_mut().for_each(|boxes| boxes.retain(|b| classes.contains(&b.class)));
                 frame.timestamp_ns = played.stamp_ns(&rendered, index);
-                // The receiver is gone: the run has ended.
+                // The receiver is gone because the run has ended.
                 if sender.send((frame, started.elapsed())).is_err() {
                     return;
                 }
@@ -122,15 +125,16 @@ impl Renderer {
         Ok(Self { world, part, frames: Some(frames), thread: Some(thread) })
     }
 
+    /// Waits for the next frame.
     pub fn next(&mut self, stages: &mut Stages) -> Option<RgbdFrame> {
-        let asked = Instant::now();
+        let requested = Instant::now();
         let (frame, took) = self.frames.as_ref()?.recv().ok()?;
         stages.push("render", took);
-        stages.push("render wait", asked.elapsed());
+        stages.push("render wait", requested.elapsed());
         Some(frame)
     }
 
-    /// The exact poses of all frames that are played.
+    /// Returns the exact poses of all frames that are played.
     pub fn truth(&self) -> Truth {
         let pose = |index| StampedPose::new(self.part.stamp_ns(&self.world, index), self.world.pose(index));
         Truth { origin: "the synthetic world".into(), poses: self.part.indices().map(pose).collect() }
@@ -141,7 +145,7 @@ impl Drop for Renderer {
     fn drop(&mut self) {
         self.frames = None;
         if let Some(thread) = self.thread.take() {
-            // A panic of the renderer was reported by its thread already.
+            // A panic of the renderer has been reported by its thread.
             let _ = thread.join();
         }
     }
