@@ -1,25 +1,33 @@
-//! In: an evaluation. Out: its table.
+//! In: an evaluation, or errors. Out: their table.
 
-use yfslam_eval::{AlignmentKind, Evaluation, Statistics};
+use yfslam_eval::{AlignmentKind, Evaluation, Rpe, Statistics};
 
 use crate::table::{Table, TableStyle};
 
 /// Returns the errors as a table, with a line below it on the association and the tracked frames.
+pub fn evaluation_table(evaluation: &Evaluation, style: TableStyle) -> String {
+    let ate = (format!("ATE, {} (m)", evaluation.ate.alignment.kind), evaluation.ate.translation_m);
+    let errors = [ate].into_iter().chain(evaluation.rpe.iter().flat_map(rpe_errors));
+    errors_table(errors).render(style) + &association(evaluation)
+}
+
+/// Returns names and statistics of a relative error: translation, then rotation.
+pub fn rpe_errors(rpe: &Rpe) -> [(String, Statistics); 2] {
+    let pairs = if rpe.options.all_pairs { "all pairs" } else { "consecutive" };
+    let name = |unit: &str| format!("RPE per {}, {pairs} ({unit})", rpe.options.delta);
+    [(name("m"), rpe.translation_m), (name("deg"), rpe.rotation_deg)]
+}
+
+/// Returns a table with a row for each error.
 ///
 /// Errors have four decimals: 0.1 mm is the resolution of the usual ground truth.
-pub fn evaluation_table(evaluation: &Evaluation, style: TableStyle) -> String {
+pub fn errors_table(errors: impl IntoIterator<Item = (String, Statistics)>) -> Table {
     let mut table = Table::new(["error", "RMSE", "mean", "median", "S.D.", "min", "max", "n"]);
-    let mut push = |name: String, s: &Statistics| {
+    for (name, s) in errors {
         let figures = [s.rmse, s.mean, s.median, s.std, s.min, s.max].map(|v| format!("{v:.4}"));
         table.push([name].into_iter().chain(figures).chain([s.count.to_string()]));
-    };
-    push(format!("ATE, {} (m)", evaluation.ate.alignment.kind), &evaluation.ate.translation_m);
-    for rpe in &evaluation.rpe {
-        let pairs = if rpe.options.all_pairs { "all pairs" } else { "consecutive" };
-        push(format!("RPE per {}, {pairs} (m)", rpe.options.delta), &rpe.translation_m);
-        push(format!("RPE per {}, {pairs} (deg)", rpe.options.delta), &rpe.rotation_deg);
     }
-    table.render(style) + &association(evaluation)
+    table
 }
 
 /// Describes how the poses were associated, and how much was tracked.

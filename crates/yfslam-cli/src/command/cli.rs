@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{bench, completions, config, demo, detect, eval, info, map, run, synth};
+use crate::command::{bench, completions, config, demo, detect, eval, evo, info, map, run, synth};
 use crate::input::detector::describe_embedded;
 use crate::ui::verbosity::Verbosity;
 
@@ -36,6 +36,8 @@ pub enum Command {
     Run(Box<run::RunArgs>),
     Map(map::DenseMapArgs),
     Eval(eval::EvalArgs),
+    Ape(evo::ApeArgs),
+    Rpe(evo::RpeArgs),
     Demo(demo::DemoArgs),
     Detect(detect::DetectArgs),
     Synth(synth::SynthArgs),

@@ -1,10 +1,9 @@
 //! `yfslam completions`: a completion script for a shell.
 
 use anyhow::Result;
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
-use crate::command::cli::Cli;
 use crate::ui::terminal::print;
 
 const HELP: &str = "\
@@ -21,8 +20,8 @@ pub struct CompletionsArgs {
     pub shell: Shell,
 }
 
-pub fn run(args: &CompletionsArgs) -> Result<()> {
+pub fn run(args: &CompletionsArgs, mut command: Command) -> Result<()> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "yfslam", &mut script);
+    clap_complete::generate(args.shell, &mut command, "yfslam", &mut script);
     print(&String::from_utf8_lossy(&script))
 }

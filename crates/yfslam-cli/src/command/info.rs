@@ -116,7 +116,7 @@ fn timing(text: &mut String, sequence: &Sequence) -> Result<()> {
     let Some(offset) = info.offset else { return Ok(()) };
     writeln!(
         text,
-        "offset        {} by {:.1} ms in the median; at most {:.1} ms apart",
+        "offset        {} by {:.1} ms in the median, by {:.1} ms at most",
         if sequence.depth_source == DepthSource::Stereo { "right lags left" } else { "depth lags colour" },
         seconds(offset.median_ns) * 1e3,
         seconds(offset.max_abs_ns) * 1e3

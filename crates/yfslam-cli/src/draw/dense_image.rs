@@ -1,22 +1,22 @@
-//! Pictures of a dense map: from above, and from a corner above it.
+//! Images of a dense map: from above, and from a corner above it.
 //!
-//! In: a coloured cloud whose z-axis points up. Out: pictures. Each point is drawn as large as its voxel; what hangs above `cut_m` is
-//! left out, for one wants to look into rooms.
+//! In: a coloured point cloud whose z-axis points up. Out: images. Each point is drawn as large as its voxel; points above `cut_m` are
+//! left out, so that ceilings do not hide rooms.
 
 use nalgebra::{Point3, Vector3};
 use yfslam::dense::cloud::CloudPoint;
 use yfslam::image::{Image, RgbImage};
 
-/// Height above the floor from which pictures leave out what is there, m.
+/// Height above the floor above which images leave points out, m.
 pub const SHOWN_M: f32 = 1.9;
-/// What is behind everything.
+/// Colour of the background.
 const PAPER: [u8; 3] = [250, 250, 250];
-/// Paper around the map, m.
+/// Margin around the map, m.
 const MARGIN_M: f32 = 0.2;
-/// Shades by which points look solid: lighter above, darker below.
+/// Factors of brightness at the bottom and at the top.
 const SHADE: [f32; 2] = [0.8, 1.1];
 
-/// A picture being drawn, with the depth of each pixel.
+/// An image with the depth of each pixel.
 struct Canvas {
     image: RgbImage,
     nearest: Image<f32>,
@@ -30,7 +30,7 @@ impl Canvas {
         Self { image, nearest }
     }
 
-    /// A square of side `size`, px, in front of what is farther than `depth`.
+    /// Draws a square of side `size`, px, over pixels that are farther than `depth`.
     fn square(&mut self, [x, y]: [f32; 2], size: f32, depth: f32, color: [u8; 3]) {
         let range = |at: f32, end: usize| {
             let from = (at - size / 2.0).round().max(0.0) as usize;
@@ -49,7 +49,7 @@ impl Canvas {
     }
 }
 
-/// The map from above, as large as fits: x up, y to the left, as the first picture looks.
+/// Draws the map from above, as large as possible: x up, y to the left, in the direction of the first image.
 pub fn from_above(points: &[CloudPoint], resolution_m: f32, cut_m: f32, [width, height]: [usize; 2]) -> RgbImage {
     let shown = || points.iter().filter(|p| p.position_m[2] < cut_m);
     let mut canvas = Canvas::new(width, height);
@@ -65,7 +65,7 @@ pub fn from_above(points: &[CloudPoint], resolution_m: f32, cut_m: f32, [width, 
     canvas.image
 }
 
-/// The map from behind its first view, from above.
+/// Draws the map from behind and above the first camera.
 pub fn from_corner(points: &[CloudPoint], resolution_m: f32, cut_m: f32, [width, height]: [usize; 2]) -> RgbImage {
     let shown = || points.iter().filter(|p| p.position_m[2] < cut_m);
     let mut canvas = Canvas::new(width, height);
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn from_above_the_higher_of_two_points_is_seen_and_the_ceiling_is_not() {
+    fn from_above_the_higher_of_two_points_is_drawn_and_the_ceiling_is_not() {
         let (red, blue, white) = ([200, 0, 0], [0, 0, 200], [255; 3]);
         let points = [
             point([0.0, 0.0, 0.0], blue),
@@ -122,8 +122,8 @@ mod tests {
             point([2.0, 1.0, 2.6], white),
         ];
         // 2.4 m up and 1.4 m across at 100 px a metre; x is up, y to the left.
-        let picture = from_above(&points, 0.1, 2.0, [140, 240]);
-        let at = |x: f32, y: f32| picture.row(((2.2 - x) * 100.0) as usize)[((1.2 - y) * 100.0) as usize];
+        let image = from_above(&points, 0.1, 2.0, [140, 240]);
+        let at = |x: f32, y: f32| image.row(((2.2 - x) * 100.0) as usize)[((1.2 - y) * 100.0) as usize];
         assert!(at(0.0, 0.0)[0] > 150 && at(0.0, 0.0)[2] == 0);
         assert!(at(2.0, 1.0)[2] > 150 && at(2.0, 1.0)[0] == 0);
         assert_eq!(at(1.0, 0.5), PAPER);

@@ -1,11 +1,11 @@
-//! Outlines, discs and tints on a colour image; whatever lies outside is cut off.
+//! Rectangles, discs and tints on a colour image; what lies outside is clipped.
 
 use yfslam::image::{Image, RgbImage};
 
 /// Red, green, blue.
 pub type Color = [u8; 3];
 
-/// Colours the pixel at column `x`, row `y`.
+/// Sets the pixel at column `x`, row `y`.
 pub fn point(image: &mut RgbImage, x: i64, y: i64, color: Color) {
     let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
     if x < image.width()
@@ -24,23 +24,23 @@ pub fn tint(image: &mut RgbImage, x: usize, y: usize, color: Color, share: f32) 
     }
 }
 
-/// Mixes `color` into the pixels where `mask` is not 0, as [`tint`]; those on its edge become it.
+/// Mixes `color` into the pixels where `mask` is not 0, as [`tint`]; pixels on its edge get the colour itself.
 pub fn stain(image: &mut RgbImage, mask: &Image<u8>, color: Color, share: f32) {
     for y in 0..mask.height() {
         for x in 0..mask.width() {
-            // Before the first column or row, the position wraps to one that no image has.
-            let beside = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
+            // Positions before the first column or row wrap to values outside of every image.
+            let neighbours = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
             if mask.get(x, y).is_some_and(|value| *value != 0) {
-                let is_edge = beside.iter().any(|&(x, y)| mask.get(x, y) == Some(&0));
+                let is_edge = neighbours.iter().any(|&(x, y)| mask.get(x, y) == Some(&0));
                 tint(image, x, y, color, if is_edge { 1.0 } else { share });
             }
         }
     }
 }
 
-/// The outline of the box between two corners, `thickness` px wide, drawn inward.
+/// Draws the outline of the box between two corners, `thickness` px wide, inside the box.
 pub fn rectangle(image: &mut RgbImage, [x0, y0]: [i64; 2], [x1, y1]: [i64; 2], thickness: i64, color: Color) {
-    // Cut off first: a box from a detector may lie anywhere.
+    // Clipped first, because the box of a detector may be far outside.
     let (width, height) = (image.width() as i64, image.height() as i64);
     for inset in 0..thickness {
         for x in x0.max(0)..=x1.min(width) {
@@ -54,7 +54,7 @@ pub fn rectangle(image: &mut RgbImage, [x0, y0]: [i64; 2], [x1, y1]: [i64; 2], t
     }
 }
 
-/// The box between two corners, filled.
+/// Fills the box between two corners.
 pub fn bar(image: &mut RgbImage, [x0, y0]: [i64; 2], [x1, y1]: [i64; 2], color: Color) {
     let (width, height) = (image.width() as i64, image.height() as i64);
     for y in y0.max(0)..=y1.min(height) {
@@ -64,12 +64,12 @@ pub fn bar(image: &mut RgbImage, [x0, y0]: [i64; 2], [x1, y1]: [i64; 2], color: 
     }
 }
 
-/// A filled disc.
+/// Draws a filled disc.
 pub fn disc(image: &mut RgbImage, [x, y]: [f32; 2], radius: f32, color: Color) {
     ring(image, [x, y], 0.0, radius, color);
 }
 
-/// The pixels whose distance from a centre lies between two radii.
+/// Fills the pixels whose distance from a centre lies between two radii.
 pub fn ring(image: &mut RgbImage, [x, y]: [f32; 2], inner: f32, outer: f32, color: Color) {
     let (cx, cy, reach) = (x.round() as i64, y.round() as i64, outer.ceil() as i64);
     for dy in -reach..=reach {
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_is_cut_off() {
+    fn what_lies_outside_is_clipped() {
         let mut image = RgbImage::new(4, 4);
         rectangle(&mut image, [-1_000_000_000_000, -5], [2, 2], 2, WHITE);
         disc(&mut image, [-3.0, 90.0], 2.0, WHITE);

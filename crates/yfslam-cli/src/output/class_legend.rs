@@ -1,6 +1,4 @@
-//! What classes of voxels are called and how they are coloured.
-//!
-//! In: the classes of a map. Out: a colour for each, the same in every map, and the list of those that occur.
+//! Names, colours and voxel counts of the classes in a dense map.
 
 use std::fmt;
 
@@ -10,12 +8,12 @@ use yfslam::dense::classes::Classes;
 
 use crate::draw::colors::class_color;
 
-/// The classes that occur, and how often.
+/// The classes that occur in a map.
 #[derive(Clone, Debug, Serialize)]
 pub struct ClassLegend {
     /// Occupied voxels without a class.
     unknown: usize,
-    /// The others, most voxels first.
+    /// The other classes, those with most voxels first.
     classes: Vec<Entry>,
 }
 
@@ -29,7 +27,7 @@ struct Entry {
 }
 
 impl ClassLegend {
-    /// Counts the occupied voxels of each class; `names` from class 1 on.
+    /// Counts the occupied voxels of each class; `names` start with class 1.
     pub fn of(names: &[String], volume: &Volume, classes: &Classes) -> Self {
         let mut counts = [0; 256];
         let occupied = volume.voxels().filter(|known| known.occupied);
@@ -51,7 +49,7 @@ impl fmt::Display for ClassLegend {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let named = |entry: &Entry| format!("{} {}", entry.name, entry.voxels);
         let known: Vec<String> = self.classes.iter().map(named).collect();
-        let known = if known.is_empty() { "none found".to_owned() } else { known.join(", ") };
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
         writeln!(f, "classes, in voxels: {known}; {} unknown", self.unknown)
     }
 }

@@ -1,6 +1,6 @@
-//! Takes frames through SLAM and keeps what became of them.
+//! Runs SLAM on frames and records the results.
 //!
-//! In: a configuration, a camera, frames. Out: an [`Outcome`]. No truth comes in here.
+//! In: a SLAM system, frames. Out: an [`Outcome`]. Ground truth is not used here.
 
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
@@ -22,7 +22,7 @@ use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
 use crate::stats::tally::{DynamicTally, FrameTally};
 
-/// SLAM with a record of what happened.
+/// SLAM with a record of its results.
 pub struct Pipeline {
     slam: Slam,
     /// Durations of all stages of all frames.
@@ -38,19 +38,19 @@ pub struct Pipeline {
     maps_inline: bool,
     started: Instant,
     state: TrackingState,
-    /// Most features, and most of them with depth, in a frame before the map began.
+    /// Largest number of features, and of static features with depth, in a frame before initialisation.
     best_start: (usize, usize),
 }
 
-/// What came out of a run.
+/// The results of a run.
 pub struct Outcome {
-    /// All tracked frames, as the map has them at the end.
+    /// Final poses of all tracked frames.
     pub trajectory: Vec<StampedPose>,
-    /// All tracked frames, as they were known at their time.
+    /// Poses of all tracked frames as estimated at their time.
     pub live: Vec<StampedPose>,
-    /// The keyframes of this run that are in the map at the end.
+    /// Keyframes of this run in the final map.
     pub keyframes: Vec<StampedPose>,
-    /// The landmarks.
+    /// Landmarks of the final map.
     pub landmarks: Vec<PlyPoint>,
     pub frames: FrameTally,
     pub dynamic: DynamicTally,
@@ -83,7 +83,7 @@ impl Pipeline {
         }
     }
 
-    /// Takes one frame through SLAM; one that it refuses is counted as skipped. Returns the state after it.
+    /// Tracks one frame and returns the state after it; a frame that SLAM refuses is counted as skipped.
     pub fn track(&mut self, frame: &RgbdFrame) -> TrackingState {
         let started = Instant::now();
         let (result, cpu) = cpu::timed(|| self.slam.track(frame));
@@ -99,12 +99,12 @@ impl Pipeline {
         let wall = started.elapsed();
         self.stages.push("frame", wall);
         self.count_processor_time(cpu.unwrap_or_default(), wall, &tracked);
-        self.note_times(&tracked);
+        self.add_stages(&tracked);
         self.frames.count(tracked.state);
         self.dynamic.count(&self.slam);
         self.recognition.count(&tracked);
         if self.slam.resets() > self.resets {
-            // A new map is a new world: poses of the old one do not belong to this trajectory.
+            // A new map has another world frame: earlier poses do not belong to this trajectory.
             self.resets = self.slam.resets();
             self.live.clear();
             self.frames.restart();
@@ -112,7 +112,7 @@ impl Pipeline {
         if let Some(pose) = tracked.t_world_cam {
             self.live.push(StampedPose { timestamp_ns: tracked.timestamp_ns, pose });
         } else if self.frames.tracked == 0 {
-            self.note_start();
+            self.update_best_start();
         }
         tracked.state
     }
@@ -123,7 +123,7 @@ impl Pipeline {
         self.frames.skip(skip);
     }
 
-    /// The system as the last frame left it.
+    /// Returns the system after the last frame.
     pub fn slam(&self) -> &Slam {
         &self.slam
     }
@@ -133,12 +133,12 @@ impl Pipeline {
         self.parts.add(Part::Dense, took);
     }
 
-    /// Whether the last frame became a keyframe.
+    /// Returns whether the last frame became a keyframe.
     pub fn made_keyframe(&self) -> bool {
         self.made_keyframe
     }
 
-    /// What became of the frames so far.
+    /// Returns the counts of frames so far.
     pub fn frames(&self) -> &FrameTally {
         &self.frames
     }
@@ -152,7 +152,7 @@ impl Pipeline {
         tracing::debug!(frame, %time, inliers = tracked.inliers, keyframe = tracked.is_keyframe, "frame");
     }
 
-    fn note_times(&mut self, tracked: &Tracked) {
+    fn add_stages(&mut self, tracked: &Tracked) {
         let times = &tracked.times;
         self.stages.push("features", times.features);
         let detections: Vec<_> = self.detector_times.iter().flat_map(Receiver::try_iter).collect();
@@ -183,22 +183,22 @@ impl Pipeline {
         self.parts.add(Part::Tracking, cpu.saturating_sub(mapping));
     }
 
-    fn note_start(&mut self) {
+    fn update_best_start(&mut self) {
         let features = &self.slam.last_frame().features.features;
         let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
         self.best_start = self.best_start.max((features.len(), with_depth));
     }
 
-    /// The map as bytes, for a later run.
+    /// Encodes the map for a later run.
     ///
     /// # Errors
-    /// It cannot be written, which would be a fault of this program.
+    /// It cannot be encoded, which would be a fault of this program.
     pub fn save_map(&mut self) -> Result<Vec<u8>> {
         self.settle();
         Ok(self.slam.save_map()?)
     }
 
-    /// Waits for mapping that is under way.
+    /// Waits until mapping is finished.
     pub fn settle(&mut self) {
         if let (Some(closed), Some(last)) = (self.slam.settle(), self.live.last()) {
             self.recognition.close(last.timestamp_ns, &closed);
@@ -212,17 +212,17 @@ impl Pipeline {
     pub fn finish(mut self, config: &Config) -> Result<Outcome> {
         self.settle();
         self.recognition.keyframes_dropped = self.slam.passed_over();
-        let of_submaps: Vec<usize> = self.slam.trajectories().iter().map(Vec::len).collect();
+        let submap_sizes: Vec<usize> = self.slam.trajectories().iter().map(Vec::len).collect();
         self.recognition.frames_in_other_submaps =
-            of_submaps.iter().sum::<usize>() - of_submaps.iter().max().copied().unwrap_or(0);
+            submap_sizes.iter().sum::<usize>() - submap_sizes.iter().max().copied().unwrap_or(0);
         let wall = self.started.elapsed();
         self.frames.detector_failures = self.slam.detector_failures();
         if self.frames.tracked == 0 {
             self.fail(config)?;
         }
         let map = self.slam.map();
-        let of_this_run = map.keyframes().filter(|(_, k)| k.sequence >= self.slam.first_keyframe());
-        let mut keyframes: Vec<_> = of_this_run.map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
+        let new_keyframes = map.keyframes().filter(|(_, k)| k.sequence >= self.slam.first_keyframe());
+        let mut keyframes: Vec<_> = new_keyframes.map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
         keyframes.sort_by_key(|&(sequence, ..)| sequence);
         let landmark =
             |l: &yfslam::map::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
@@ -240,7 +240,7 @@ impl Pipeline {
         })
     }
 
-    /// Why there is no trajectory.
+    /// Returns an error that says why there is no trajectory.
     fn fail(&self, config: &Config) -> Result<()> {
         let FrameTally { read, skipped, first_skipped, .. } = &self.frames;
         if *read == 0 {
@@ -250,14 +250,14 @@ impl Pipeline {
         let (features, with_depth) = self.best_start;
         if config.depth.source == DepthSource::Motion {
             bail!(
-                "no trajectory: no map could be begun in {read} frames ({skipped} skipped); the best had {features} features. Without depth \
-                 it takes two frames with {} matches between which the camera has moved aside, not only turned; move it sideways, or \
+                "no trajectory: no map could be initialised in {read} frames ({skipped} skipped); the best had {features} features. Without depth \
+                 initialisation needs two frames with {} matches and sideways motion of the camera between them; move it sideways, or \
                  lower the keys start_* of section monocular in --config",
                 config.monocular.start_min_matches
             );
         }
         bail!(
-            "no trajectory: no map could be begun in {read} frames ({skipped} skipped); the best had {features} features, \
+            "no trajectory: no map could be initialised in {read} frames ({skipped} skipped); the best had {features} features, \
              {with_depth} of them static and with depth, but tracking.init_min_features asks for {} and \
              tracking.init_min_landmarks for {}; check camera and depth factor with `yfslam info`, or lower these in --config",
             config.tracking.init_min_features,
@@ -271,7 +271,7 @@ fn stamped((timestamp_ns, pose): (i64, Pose)) -> StampedPose {
 }
 
 impl Outcome {
-    /// Frames per second, from the first frame to the last, of everything together.
+    /// Returns the frames per second of the whole run.
     pub fn fps(&self) -> f64 {
         self.frames.total() as f64 / self.wall.as_secs_f64().max(1e-9)
     }

@@ -1,17 +1,17 @@
-//! How long each stage took, frame by frame.
+//! Durations of the stages of all frames.
 
 use std::time::Duration;
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// Durations of the stages, in the order in which they were first seen.
+/// Durations of the stages, in the order in which the stages first ran.
 #[derive(Clone, Debug, Default)]
 pub struct Stages(Vec<(&'static str, Vec<Duration>)>);
 
 /// Order statistics of one stage (nearest rank), ms.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct StageSummary {
-    /// How often it ran.
+    /// Number of runs.
     pub count: usize,
     pub median_ms: f64,
     pub p95_ms: f64,
@@ -20,7 +20,7 @@ pub struct StageSummary {
 }
 
 impl Stages {
-    /// Adds one run of a stage.
+    /// Adds the duration of one run of a stage.
     pub fn push(&mut self, stage: &'static str, took: Duration) {
         match self.0.iter_mut().find(|(name, _)| *name == stage) {
             Some((_, durations)) => durations.push(took),
@@ -28,24 +28,24 @@ impl Stages {
         }
     }
 
-    /// These stages, then those of `other`.
+    /// Returns these stages, then those of `other`.
     pub fn and(&self, other: &Self) -> Self {
         Self(self.0.iter().chain(&other.0).cloned().collect())
     }
 
-    /// Duration of all runs of a stage together.
+    /// Returns the duration of all runs of a stage together.
     pub fn total(&self, stage: &str) -> Duration {
         self.0.iter().filter(|(name, _)| *name == stage).flat_map(|(_, durations)| durations).sum()
     }
 
-    /// Each stage with its figures.
+    /// Returns each stage with its statistics.
     pub fn summaries(&self) -> impl Iterator<Item = (&'static str, StageSummary)> {
         self.0.iter().filter_map(|(name, durations)| Some((*name, StageSummary::of(durations)?)))
     }
 }
 
 impl StageSummary {
-    /// `None` if the stage never ran.
+    /// Computes statistics; `None` if the stage never ran.
     pub fn of(durations: &[Duration]) -> Option<Self> {
         let mut sorted = durations.to_vec();
         sorted.sort_unstable();
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_are_nearest_ranks_and_stages_keep_their_order() {
+    fn statistics_are_nearest_ranks_and_stages_keep_their_order() {
         let mut stages = Stages::default();
         for ms in (1..=100).rev() {
             stages.push("late", Duration::from_millis(ms));

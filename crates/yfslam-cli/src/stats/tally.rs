@@ -1,4 +1,4 @@
-//! Counts: what became of frames and features.
+//! Counts of frames and features.
 
 use std::collections::BTreeMap;
 
@@ -8,29 +8,29 @@ use yfslam::tracking::TrackingState;
 
 use crate::stats::skip::Skip;
 
-/// What became of the frames.
+/// Counts of frames.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FrameTally {
-    /// Frames that SLAM saw.
+    /// Frames that SLAM processed.
     pub read: usize,
-    /// Frames whose pose is known.
+    /// Frames that were tracked.
     pub tracked: usize,
-    /// Frames whose pose was lost.
+    /// Frames in which the camera was lost.
     pub lost: usize,
-    /// Frames before the map began.
+    /// Frames before the map was initialised.
     pub before_map: usize,
     /// Frames that could not be used.
     pub skipped: usize,
-    /// The same by kind of fault.
+    /// Skipped frames by kind of fault.
     pub skipped_by_reason: BTreeMap<&'static str, usize>,
-    /// Frame, file and fault of the first of them.
+    /// Frame, file and fault of the first skipped frame.
     pub first_skipped: Option<String>,
     /// Frames on which the detector failed; they count as frames without boxes.
     pub detector_failures: usize,
 }
 
 impl FrameTally {
-    /// Counts a frame that SLAM saw.
+    /// Counts a frame that SLAM processed.
     pub fn count(&mut self, state: TrackingState) {
         self.read += 1;
         match state {
@@ -40,7 +40,7 @@ impl FrameTally {
         }
     }
 
-    /// The map was begun anew: what was tracked before has lost its world.
+    /// Counts all frames tracked so far as lost, because the map was initialised again.
     pub fn restart(&mut self) {
         self.lost += std::mem::take(&mut self.tracked);
     }
@@ -52,27 +52,27 @@ impl FrameTally {
         self.first_skipped.get_or_insert(message);
     }
 
-    /// Frames so far.
+    /// Returns the number of frames so far.
     pub fn total(&self) -> usize {
         self.read + self.skipped
     }
 
-    /// Share of all frames whose pose is known, %.
+    /// Returns the share of tracked frames, %.
     pub fn tracked_percent(&self) -> f64 {
         if self.total() == 0 { 0.0 } else { 100.0 * self.tracked as f64 / self.total() as f64 }
     }
 }
 
-/// What the dynamic filter kept out.
+/// Counts of dynamic features.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct DynamicTally {
     /// Features of all frames.
     pub features: usize,
-    /// Features that were not trusted, of all frames.
+    /// Dynamic features of all frames, which were not used.
     pub dynamic_features: usize,
-    /// Frames in which something moved.
+    /// Frames with moving regions.
     pub frames_with_motion: usize,
-    /// Boxes of movable objects, of all frames, at any score.
+    /// Bounding boxes of movable objects in all frames, of any score.
     pub boxes: usize,
 }
 

@@ -1,12 +1,12 @@
 //! The command line as text.
 
-/// The command that was given, ready to be given again.
+/// Returns the command line of this process, quoted for a shell.
 pub fn command_line() -> String {
     let arguments = std::env::args_os().skip(1).map(|argument| quote(&argument.to_string_lossy()));
     ["yfslam".to_owned()].into_iter().chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
-/// A word as a shell takes it.
+/// Quotes a word for a shell where that is necessary.
 pub fn quote(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

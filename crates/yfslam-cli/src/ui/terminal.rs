@@ -1,4 +1,4 @@
-//! What the program says: results on standard output, everything else on standard error.
+//! Messages: results on standard output, everything else on standard error.
 
 use std::io::{self, IsTerminal, Write};
 
@@ -6,14 +6,14 @@ use anyhow::Result;
 
 use crate::ui::verbosity::Verbosity;
 
-/// Says things as loudly as the user wants.
+/// Prints results, notes and warnings, depending on the verbosity.
 #[derive(Clone, Copy, Debug)]
 pub struct Terminal {
     verbosity: Verbosity,
 }
 
 impl Terminal {
-    /// Starts logging too, at the level that `verbosity` asks for.
+    /// Sets up messages and logging.
     pub fn new(verbosity: Verbosity) -> Self {
         let level = match verbosity.verbose {
             0 => tracing::Level::WARN,
@@ -21,67 +21,67 @@ impl Terminal {
             2 => tracing::Level::DEBUG,
             _ => tracing::Level::TRACE,
         };
-        // Fails only if logging was started before, and then it runs.
+        // Fails only if logging is set up already.
         let _ = tracing_subscriber::fmt().with_max_level(level).with_writer(io::stderr).without_time().try_init();
         Self { verbosity }
     }
 
-    /// Whether progress and notes are unwanted.
+    /// Returns whether progress and notes are suppressed.
     pub fn is_quiet(self) -> bool {
         self.verbosity.quiet
     }
 
-    /// Whether progress can be drawn in place: log lines would tear it.
+    /// Returns whether progress is drawn in place, which log lines would disturb.
     pub fn draws(self) -> bool {
         !self.is_quiet() && self.verbosity.verbose == 0 && io::stderr().is_terminal()
     }
 
-    /// A result that is not printed if the user wants silence.
+    /// Prints a result, unless the user chose `--quiet`.
     pub fn result(self, text: &str) -> Result<()> {
         if self.is_quiet() { Ok(()) } else { print(text) }
     }
 
-    /// Something worth knowing.
+    /// Prints a note.
     pub fn note(self, text: &str) {
         if !self.is_quiet() {
-            say("note", text);
+            print_message("note", text);
         }
     }
 
-    /// Something that may be wrong.
+    /// Prints a warning.
     pub fn warn(self, text: &str) {
-        say("warning", text);
+        print_message("warning", text);
     }
 }
 
-/// Prints what the user asked for.
+/// Prints to standard output.
 pub fn print(text: &str) -> Result<()> {
     let mut out = io::stdout().lock();
     out.write_all(text.as_bytes())?;
     Ok(out.flush()?)
 }
 
-/// Why the program ends without success.
+/// Prints the error that ends the program.
 pub fn error(error: &anyhow::Error) {
-    say("error", &explain(error));
+    print_message("error", &explain(error));
 }
 
-/// The error and its causes, without those that the error before has told already.
+/// Returns the error with its causes; a cause that is part of the message before it is left out.
 pub fn explain(error: &anyhow::Error) -> String {
-    error.chain().map(ToString::to_string).fold(String::new(), |told, cause| match told {
-        told if told.is_empty() => cause,
-        told if told.contains(&cause) => told,
-        told => format!("{told}: {cause}"),
+    error.chain().map(ToString::to_string).fold(String::new(), |text, cause| match text {
+        text if text.is_empty() => cause,
+        text if text.contains(&cause) => text,
+        text => format!("{text}: {cause}"),
     })
 }
 
-/// Whether the reader of our output has gone, as `head` does: no failure of ours.
+/// Returns whether the reader of the output has ended, such as `head`, which is not an error.
 pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
 }
 
-fn say(kind: &str, text: &str) {
-    // Nobody is left to tell if standard error is closed.
+fn print_message(kind: &str, text: &str) {
+    // If standard error is closed, there is no other place for the message.
     let _ = writeln!(io::stderr().lock(), "{kind}: {text}");
 }
 
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cause_is_told_once() {
+    fn a_cause_is_printed_once() {
         let error = anyhow!("no such file").context("cannot read x: no such file; check the path").context("no run");
         assert_eq!(explain(&error), "no run: cannot read x: no such file; check the path");
     }

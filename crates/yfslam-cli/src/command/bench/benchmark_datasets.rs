@@ -1,22 +1,22 @@
-//! Recorded sequences in which things move, by the names that their data sets give them.
+//! The dynamic sequences of public benchmarks, by their names.
 //!
-//! In: a folder with folders. Out: which of them are sequences, and which of the known sequences are missing.
+//! In: a folder with folders. Out: which of them are sequences, and which sequences of the benchmarks are missing.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-/// Sequences recorded by one group with one camera, or two.
+/// Sequences of one data set.
 pub struct DataSet {
-    /// Its name.
+    /// Name of the data set.
     pub name: &'static str,
-    /// Where it can be had.
+    /// Where to get it.
     pub home: &'static str,
     /// Folder names, with the preset of the camera.
     pub sequences: &'static [(&'static str, &'static str)],
 }
 
-/// The data sets whose dynamic sequences are known, with all of these.
+/// The data sets with their dynamic sequences.
 pub const DATA_SETS: [DataSet; 2] = [
     DataSet {
         name: "TUM RGB-D benchmark, dynamic objects",
@@ -65,26 +65,26 @@ pub const DATA_SETS: [DataSet; 2] = [
     },
 ];
 
-/// Known sequences in a folder.
-pub struct Found {
-    /// Those that are there, in the order of the data sets.
+/// Benchmark sequences in a folder.
+pub struct FoundSequences {
+    /// Sequences that exist, in the order of the data sets.
     pub folders: Vec<PathBuf>,
-    /// What is missing and where it can be had; empty if nothing is.
+    /// Which sequences are missing and where to get them; empty if none is missing.
     pub missing: String,
 }
 
-/// Seeks the known sequences in `root`, or in its folders: archives may unpack into a folder of their data set.
+/// Searches for benchmark sequences in `root` and in its folders: some archives unpack into a folder of their data set.
 ///
 /// # Errors
-/// The folder cannot be read, or none of them is there.
-pub fn find(root: &Path) -> Result<Found> {
+/// The folder cannot be read, or has no such sequence.
+pub fn find(root: &Path) -> Result<FoundSequences> {
     let folders = sub_folders(root)?;
-    let places: Vec<&Path> = [root].into_iter().chain(folders.iter().map(PathBuf::as_path)).collect();
-    let mut found = Found { folders: Vec::new(), missing: String::new() };
+    let parents: Vec<&Path> = [root].into_iter().chain(folders.iter().map(PathBuf::as_path)).collect();
+    let mut found = FoundSequences { folders: Vec::new(), missing: String::new() };
     for set in &DATA_SETS {
         let mut missing = Vec::new();
         for (name, _) in set.sequences {
-            match places.iter().map(|place| place.join(name)).find(|folder| is_sequence(folder)) {
+            match parents.iter().map(|parent| parent.join(name)).find(|folder| is_sequence(folder)) {
                 Some(folder) => found.folders.push(folder),
                 None => missing.push(*name),
             }
@@ -103,17 +103,17 @@ pub fn find(root: &Path) -> Result<Found> {
     }
     ensure!(
         !found.folders.is_empty(),
-        "{} holds none of the known sequences\n{}",
+        "{} holds none of the benchmark sequences\n{}",
         root.display(),
         found.missing.trim_end()
     );
     Ok(found)
 }
 
-/// The sequences that are meant by a folder: itself if it has lists of images, else the folders in it that have.
+/// Returns the folder itself if it is a sequence, else the sequences in it.
 ///
 /// # Errors
-/// The folder cannot be read, or there are none.
+/// The folder cannot be read, or there is no sequence.
 pub fn sequences_in(folder: &Path) -> Result<Vec<PathBuf>> {
     if is_sequence(folder) {
         return Ok(vec![folder.into()]);
@@ -121,14 +121,14 @@ pub fn sequences_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let sequences: Vec<PathBuf> = sub_folders(folder)?.into_iter().filter(|sub| is_sequence(sub)).collect();
     ensure!(
         !sequences.is_empty(),
-        "neither {} nor any folder in it has lists of images (rgb.txt and depth.txt, or associations.txt); name a sequence in TUM or \
-         Bonn layout, or a folder of such",
+        "neither {} nor any folder in it has lists of images (rgb.txt and depth.txt, or associations.txt); give a sequence in TUM or \
+         Bonn layout, or a folder of sequences",
         folder.display()
     );
     Ok(sequences)
 }
 
-/// The camera of the sequence that has this name, if it is known and the folder has no camera file of its own.
+/// Returns the camera of a benchmark sequence, if the folder has its name and no camera file.
 pub fn camera_of(folder: &Path) -> Option<&'static str> {
     let name = folder.file_name()?.to_str()?;
     let (_, camera) = DATA_SETS.iter().flat_map(|set| set.sequences).find(|(known, _)| *known == name)?;
@@ -141,7 +141,7 @@ fn is_sequence(folder: &Path) -> bool {
     has("associations.txt") || (has("rgb.txt") && has("depth.txt"))
 }
 
-/// Sorted by name.
+/// Returns the folders in a folder, sorted by name.
 fn sub_folders(folder: &Path) -> Result<Vec<PathBuf>> {
     let cannot = || format!("cannot read the folder {}; check the path", folder.display());
     let mut folders = Vec::new();
@@ -169,12 +169,14 @@ mod tests {
     }
 
     #[test]
-    fn known_sequences_are_found_and_the_missing_ones_named_with_their_source() {
+    fn benchmark_sequences_are_found_and_the_missing_ones_are_listed_with_their_source() {
         let temporary = tempfile::tempdir().unwrap();
         let root = temporary.path();
         fs::create_dir_all(root.join("rgbd_bonn_crowd2")).unwrap();
         let message = find(root).err().unwrap().to_string();
-        assert!(message.contains("none of the known") && message.contains("9 of 9") && message.contains("24 of 24"));
+        assert!(
+            message.contains("none of the benchmark") && message.contains("9 of 9") && message.contains("24 of 24")
+        );
         make(root, "rgbd_bonn_dataset/rgbd_bonn_crowd");
         make(root, "rgbd_dataset_freiburg3_walking_xyz");
         make(root, "elsewhere");
@@ -184,13 +186,13 @@ mod tests {
         assert!(found.missing.contains("8 of 9") && found.missing.contains("23 of 24"), "{}", found.missing);
         assert!(found.missing.contains("rgbd_bonn_crowd2,") && !found.missing.contains("rgbd_bonn_crowd,"));
         assert!(found.missing.contains("cvg.cit.tum.de") && found.missing.contains("ipb.uni-bonn.de"));
-        assert_eq!(sequences_in(root).unwrap().len(), 2, "those right in the folder");
+        assert_eq!(sequences_in(root).unwrap().len(), 2, "only those directly in the folder");
         assert!(sequences_in(&root.join("rgbd_bonn_crowd2")).err().unwrap().to_string().contains("lists of images"));
         assert!(find(&root.join("nowhere")).err().unwrap().to_string().contains("check the path"));
     }
 
     #[test]
-    fn a_known_sequence_without_a_camera_file_has_that_of_its_data_set() {
+    fn a_benchmark_sequence_without_a_camera_file_has_the_camera_of_its_data_set() {
         let temporary = tempfile::tempdir().unwrap();
         let folder = temporary.path().join("rgbd_bonn_crowd");
         make(temporary.path(), "rgbd_bonn_crowd");

@@ -1,4 +1,4 @@
-//! One cell of the table, and the group of cells that one run fills.
+//! The results of one method on one sequence with one seed, and the groups that one process computes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,54 +10,54 @@ use yfslam_io::write_atomically;
 
 use crate::output::folder::FAILURE_FILE;
 
-/// The cells of one sequence and one seed.
+/// The cells of one sequence and one seed, which one process computes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Group {
     /// Name in the table.
     pub sequence: String,
-    /// As `yfslam run` takes it.
+    /// Sequence for `yfslam run`.
     pub source: String,
-    /// Names of methods, each once.
+    /// Names of the methods, each once.
     pub methods: Vec<String>,
-    /// Of the world, or of the method's random draws.
+    /// Seed of the world or of the random draws of the method.
     pub seed: u64,
-    /// Words that set frames and seed.
+    /// Options that set frames and seed.
     pub options: Vec<String>,
-    /// Words that name a detector, for methods that need one.
+    /// Options that set a detector, for methods that need one.
     pub detector: Vec<String>,
-    /// Whether it is all of a recorded sequence, as it was recorded: only then may it stand beside published figures.
+    /// Whether it is a whole recorded sequence without changes: only then is it compared with published results.
     pub whole: bool,
 }
 
 impl Group {
-    /// Name of the group's folder.
+    /// Returns the name of the group's folder.
     pub fn key(&self) -> String {
         let name: String = self.sequence.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         format!("{name}-{}", self.seed)
     }
 
-    /// Words for this program to run some of the methods, but for the output folder.
+    /// Returns the arguments that run some of the methods, without the output folder.
     pub fn arguments(&self, methods: &[&str], extra: &[String]) -> Vec<String> {
-        let words = ["run", &self.source, "--method", &methods.join(",")].map(str::to_owned);
+        let arguments = ["run", &self.source, "--method", &methods.join(",")].map(str::to_owned);
         let detector = if methods.iter().any(|method| *method != "none") { &self.detector[..] } else { &[] };
-        words.into_iter().chain([&self.options, detector, extra].concat()).collect()
+        arguments.into_iter().chain([&self.options, detector, extra].concat()).collect()
     }
 }
 
-/// What came of one method.
+/// The results of one method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Name in the table.
     pub sequence: String,
     /// Name of the method.
     pub method: String,
-    /// Of the world, or of the method's random draws.
+    /// Seed of the world or of the random draws of the method.
     pub seed: u64,
     /// Absolute trajectory error after alignment by SE(3), RMSE, m.
     pub ate_rmse_m: Option<f64>,
     /// The same, standard deviation, m.
     pub ate_std_m: Option<f64>,
-    /// Share of the frames whose pose is known.
+    /// Share of the frames that are tracked.
     pub tracked: Option<f64>,
     /// Relative pose error over a frame, RMSE, m.
     pub rpe_frame_m: Option<f64>,
@@ -73,18 +73,18 @@ pub struct Cell {
     pub stages_ms: BTreeMap<String, f64>,
     /// Processor time of the process for a frame, without that of other methods in the same process, ms.
     pub process_ms_per_frame: Option<f64>,
-    /// As of its [`Group`].
+    /// As in [`Group`].
     pub whole: bool,
-    /// Why there are no figures.
+    /// Why there are no results.
     pub failure: Option<String>,
-    /// Words with which this program runs the cell alone, to the same figures.
+    /// Arguments with which this program computes the cell alone, with the same results.
     pub arguments: Vec<String>,
-    /// CRC-32 of the program that ran.
+    /// CRC-32 of the program.
     pub program_crc32: String,
 }
 
 impl Cell {
-    /// The figures of a method from what its run left in `folder`; `failure` if it left nothing.
+    /// Reads the results of a method from its output folder; `failure` is used if the folder has no result.
     pub fn of_run(
         group: &Group,
         method: &str,
@@ -95,13 +95,13 @@ impl Cell {
     ) -> Self {
         let text = std::fs::read_to_string(folder.join("run.json")).unwrap_or_default();
         let run: Value = serde_json::from_str(&text).unwrap_or_default();
-        let figure = |place: &str| run.pointer(place).and_then(Value::as_f64);
+        let figure = |pointer: &str| run.pointer(pointer).and_then(Value::as_f64);
         let ate_rmse_m = figure("/evaluation/ate/translation_m/rmse");
         let other_methods_ms = figure("/process_parts_ms_per_frame/other_methods").unwrap_or(0.0);
         let own_failure = || Some(std::fs::read_to_string(folder.join(FAILURE_FILE)).ok()?.trim().to_owned());
         let failure = match run {
             Value::Null => own_failure().or_else(|| failure.map(str::to_owned)),
-            _ if ate_rmse_m.is_none() => Some("no ground truth to judge it by".into()),
+            _ if ate_rmse_m.is_none() => Some("no ground truth for the evaluation".into()),
             _ => None,
         };
         let stages = run.pointer("/times").and_then(Value::as_object).into_iter().flatten();
@@ -127,7 +127,7 @@ impl Cell {
         }
     }
 
-    /// The cell at `path`, if a whole one is there.
+    /// Reads the cell at `path`; `None` if it is missing or damaged.
     pub fn read(path: &Path) -> Option<Self> {
         serde_json::from_str(&std::fs::read_to_string(path).ok()?).ok()
     }

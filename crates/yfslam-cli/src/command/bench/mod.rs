@@ -1,4 +1,4 @@
-//! `yfslam bench`: the paper's tables over sequences, methods and seeds.
+//! `yfslam bench`: the tables of the paper over sequences, methods and seeds.
 
 mod benchmark_datasets;
 mod cell;
@@ -81,19 +81,19 @@ pub struct BenchArgs {
 }
 
 pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
-    let found = args.known.as_deref().map(benchmark_datasets::find).transpose()?;
-    let missing = found.as_ref().map_or("", |found| &found.missing);
+    let datasets = args.known.as_deref().map(benchmark_datasets::find).transpose()?;
+    let missing = datasets.as_ref().map_or("", |datasets| &datasets.missing);
     for line in missing.lines() {
         terminal.note(line);
     }
-    let groups = args.groups(found.as_ref().map(|found| found.folders.as_slice()))?;
+    let groups = args.groups(datasets.as_ref().map(|datasets| datasets.folders.as_slice()))?;
     let out = OutputFolder::prepare(args.out.as_deref(), "bench")?;
-    let program = std::env::current_exe().context("cannot find this program's own file")?;
-    let image = std::fs::read(&program).with_context(|| format!("cannot read {}", program.display()))?;
+    let program = std::env::current_exe().context("cannot find the file of this program")?;
+    let binary = std::fs::read(&program).with_context(|| format!("cannot read {}", program.display()))?;
     let bench = Bench {
         folder: out.path().into(),
         program,
-        program_crc32: format!("{:08x}", crc32fast::hash(&image)),
+        program_crc32: format!("{:08x}", crc32fast::hash(&binary)),
         jobs: args.jobs.into(),
         extra: args.extra.clone(),
     };
@@ -116,13 +116,16 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
     terminal.result(&format!("{overview}\nwritten to {}\nreport: {}\n", out.path().display(), page.display()))
 }
 
-/// Writes the tables in all forms; returns the path of the page.
+/// Writes the tables in all formats; returns the path of the page.
 fn write(out: &Path, args: &BenchArgs, cells: &[Cell], sections: &[TableSection], missing: &str) -> Result<PathBuf> {
     let mut text = String::new();
     for TableSection { id, title, about, table } in sections {
         text += &format!("## {title}\n\n{about}\n\n{}\n", table.render(TableStyle::Markdown));
-        let csv = table.render(TableStyle::Csv);
-        write_atomically(&out.join("tables").join(format!("{id}.csv")), |file| file.write_all(csv.as_bytes()))?;
+        for (extension, style) in [("csv", TableStyle::Csv), ("tex", TableStyle::Latex)] {
+            let table = table.render(style);
+            let path = out.join("tables").join(format!("{id}.{extension}"));
+            write_atomically(&path, |file| file.write_all(table.as_bytes()))?;
+        }
     }
     if !missing.is_empty() {
         text += &format!("## Not run\n\n{missing}");
@@ -138,7 +141,7 @@ fn write(out: &Path, args: &BenchArgs, cells: &[Cell], sections: &[TableSection]
     }
     facts.extend(missing.lines().map(|line| ("Not run", line.to_owned())));
     let version = env!("CARGO_PKG_VERSION");
-    let title = "Methods side by side";
+    let title = "Comparison of methods";
     let page = TablesPage { title, facts, sections, version, command: command_line() }.html();
     let path = out.join("report.html");
     for (path, text) in [(&out.join("table.md"), &text), (&out.join("cells.csv"), &csv(cells)), (&path, &page)] {
@@ -148,7 +151,7 @@ fn write(out: &Path, args: &BenchArgs, cells: &[Cell], sections: &[TableSection]
 }
 
 impl BenchArgs {
-    /// All cells, sequence by sequence.
+    /// Returns what to run, sequence by sequence.
     fn groups(&self, known: Option<&[PathBuf]>) -> Result<Vec<Group>> {
         if let Some(folders) = known {
             return Ok(folders.iter().flat_map(|folder| self.recorded(folder)).collect());
@@ -161,21 +164,21 @@ impl BenchArgs {
                 let folders = benchmark_datasets::sequences_in(Path::new(sequence))?;
                 groups.extend(folders.iter().flat_map(|folder| self.recorded(folder)));
             } else {
-                // Better known before the first run than in the middle of the night.
-                yfslam_synth::parse(sequence).with_context(|| format!("{sequence} is no folder either"))?;
+                // Checked before the first run.
+                yfslam_synth::parse(sequence).with_context(|| format!("{sequence} is not a folder either"))?;
                 groups.extend((1..=self.seeds).map(|seed| self.world(sequence, seed)));
             }
         }
         Ok(groups)
     }
 
-    /// A recorded folder, once for each seed.
+    /// Returns the runs of a recording, one for each seed.
     fn recorded(&self, folder: &Path) -> Vec<Group> {
         let name = folder.file_name().unwrap_or(folder.as_os_str()).to_string_lossy();
-        let asks_for = |option: &str| self.extra.iter().any(|word| word.split('=').next() == Some(option));
+        let has_option = |option: &str| self.extra.iter().any(|argument| argument.split('=').next() == Some(option));
         let changes = ["--start", "--end", "--reverse", "--fault", "--depth-factor"];
-        let whole = self.frames.is_none() && !changes.iter().any(|option| asks_for(option));
-        let camera = benchmark_datasets::camera_of(folder).filter(|_| !asks_for("--camera"));
+        let whole = self.frames.is_none() && !changes.iter().any(|option| has_option(option));
+        let camera = benchmark_datasets::camera_of(folder).filter(|_| !has_option("--camera"));
         let group = |seed: u64| {
             let mut options = vec!["--seed".to_owned(), seed.to_string()];
             options.extend(self.frames.into_iter().flat_map(|frames| ["--end".to_owned(), frames.to_string()]));

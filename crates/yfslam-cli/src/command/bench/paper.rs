@@ -1,7 +1,7 @@
 //! The tables of the paper: absolute and relative errors with their improvement (Tables 2 to 4, equation 3), times (Table 5), and the
 //! share of frames that were tracked.
 //!
-//! In: all cells. Out: tables with headings. What papers published stands beside a recorded sequence of the very name, if all of it was run.
+//! In: all cells. Out: tables with headings. Results from papers are added to a recorded sequence of the same name, if it was run as a whole.
 
 use yfslam_eval::{Measure, Statistics, improvement_percent, published};
 use yfslam_report::{IMPROVEMENT, ORIGIN, PUBLISHED, Table, TableSection};
@@ -9,10 +9,10 @@ use yfslam_report::{IMPROVEMENT, ORIGIN, PUBLISHED, Table, TableSection};
 use super::cell::Cell;
 use super::table::{Row, overview, rows, show};
 
-/// The method that the others are compared with: ORB-SLAM2's place in the paper.
+/// The method with which the others are compared; it corresponds to ORB-SLAM2 in the paper.
 const BASELINE: &str = "none";
 
-/// A table of errors: which they are, and where a cell has them.
+/// A table of errors, and the figures of a cell that it shows.
 struct Errors {
     id: &'static str,
     title: &'static str,
@@ -49,20 +49,20 @@ const ERRORS: [Errors; 3] = [
     },
 ];
 
-/// Stages of Table 5 by their name in `run.json`, with their heading.
+/// Stages of Table 5: name in `run.json`, and heading.
 const STAGES: [(&str, &str); 6] = [
     ("features", "features"),
     ("detector", "detector"),
     ("dynamic_filter", "dynamic filter"),
     ("tracking", "tracking"),
-    ("mapping", "mapping, a keyframe"),
-    ("frame", "frame as a whole"),
+    ("mapping", "mapping, per keyframe"),
+    ("frame", "whole frame"),
 ];
 
-/// All tables: the overview first, then those of the paper.
+/// Returns all tables: the overview first, then those of the paper.
 pub fn sections(cells: &[Cell]) -> Vec<TableSection> {
     let rows = rows(cells);
-    let about = "Median over the seeds, and the range. Lost frames have no error: read the error with the share of frames tracked.";
+    let about = "Median over the seeds, and the range. Lost frames have no error, so that an error is meaningful only together with the share of tracked frames.";
     let first = TableSection { id: "overview", title: "Overview".into(), about: about.into(), table: overview(&rows) };
     let errors = ERRORS.iter().map(|errors| errors.section(&rows));
     [first].into_iter().chain(errors).chain([times(&rows), tracked(&rows)]).collect()
@@ -90,7 +90,7 @@ impl Errors {
         }
         let about = format!(
             "Medians over the seeds. Improvement on {BASELINE}: (1 − error / error of {BASELINE}) · 100 % (equation 3). Rows marked \
-             {PUBLISHED} are figures that papers report for the whole sequence, on other machines."
+             {PUBLISHED} are results that papers report for the whole sequence, measured on other machines."
         );
         TableSection { id, title: title.to_owned(), about, table }
     }
@@ -127,7 +127,7 @@ impl Errors {
     }
 }
 
-/// Methods in the order in which they come up.
+/// Returns the methods in the order of the rows.
 fn methods<'a>(rows: &[Row<'a>]) -> Vec<&'a str> {
     let mut methods = Vec::new();
     for row in rows {
@@ -138,11 +138,11 @@ fn methods<'a>(rows: &[Row<'a>]) -> Vec<&'a str> {
     methods
 }
 
-/// Time per stage, over all sequences.
+/// Returns the times of the stages over all sequences.
 fn times(rows: &[Row]) -> TableSection {
     let mut headers = vec!["system".to_owned()];
     headers.extend(STAGES.iter().map(|(_, heading)| format!("{heading} (ms)")));
-    headers.push("processor time, a frame (ms)".to_owned());
+    headers.push("processor time per frame (ms)".to_owned());
     let mut table = Table::new(headers);
     for method in methods(rows) {
         let cells = || rows.iter().filter(|row| row.method == method).flat_map(|row| &row.cells);
@@ -155,13 +155,14 @@ fn times(rows: &[Row]) -> TableSection {
         line.push(median(&|cell| cell.process_ms_per_frame));
         table.push(line);
     }
-    let about = "Wall time on this machine: medians of the runs' medians, over all sequences and seeds. Methods run side by side, a thread \
-                 each, so give --jobs 1 and one method for times without that load. The detector runs once for all, beside or before the \
-                 other stages; the frame as a whole leaves out reading and rendering. Processor time counts all threads.";
+    let about = "Wall time on this machine: median over all sequences and seeds of the median of a run. Methods run at the same time, one \
+                 thread each; use --jobs 1 and one method for times without that load. The detector runs once for all methods; the whole \
+                 frame does not include reading and rendering. Processor time is that of the whole process, including reading and \
+                 detection, without the parts of other methods.";
     TableSection { id: "time", title: "Time of each stage (Table 5)".into(), about: about.into(), table }
 }
 
-/// Share of frames tracked, a method a column.
+/// Returns the share of tracked frames, with one column for each method.
 fn tracked(rows: &[Row]) -> TableSection {
     let methods = methods(rows);
     let mut table = Table::new(["sequence"].iter().chain(&methods).copied());
@@ -179,7 +180,7 @@ fn tracked(rows: &[Row]) -> TableSection {
             table.push(std::mem::take(&mut line));
         }
     }
-    let about = "Frames whose pose is known, % of all with a true pose: median over the seeds, and the least.";
+    let about = "Tracked frames, % of the frames with a true pose: median over the seeds, and minimum.";
     TableSection { id: "tracked", title: "Frames tracked".into(), about: about.into(), table }
 }
 
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn improvement_is_equation_3_on_medians_and_published_figures_follow_the_sequence_of_their_name() {
+    fn improvement_is_equation_3_on_medians_and_published_results_follow_their_sequence() {
         let mut cells = vec![
             cell(KNOWN, "none", 1, Some(0.8)),
             cell(KNOWN, "none", 2, Some(0.6)),
@@ -213,7 +214,7 @@ mod tests {
         let time = table_of(&sections, "time");
         assert_eq!(time[1], ["none", "-", "7.00", "-", "-", "-", "12.50", "20.00"]);
         assert_eq!(table_of(&sections, "tracked")[1], [KNOWN, "50.0 (50.0)", "50.0 (50.0)"]);
-        // A part of the sequence is not what was published about.
+        // Published results hold for the whole sequence only.
         cells.iter_mut().for_each(|cell| cell.whole = false);
         let sections = super::sections(&cells);
         assert!(table_of(&sections, "ate").iter().all(|row| !row[7].starts_with(PUBLISHED)));

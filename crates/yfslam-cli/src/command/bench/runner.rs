@@ -1,7 +1,7 @@
-//! Many runs for one table: a cell is one method on one sequence with one seed. One process runs the methods of a sequence and a seed
-//! together, on frames that are read or rendered once.
+//! Runs the cells of a bench: a cell is one method on one sequence with one seed. One process runs all methods of a sequence and a seed on
+//! frames that are read or rendered once.
 //!
-//! In: what to run. Out: one JSON a cell, which is not run again, then tables of all of them.
+//! In: groups of cells. Out: the cells, each of which is saved as JSON and not run again.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -13,40 +13,40 @@ use anyhow::{Context, Result};
 use super::cell::{Cell, Group};
 use crate::output::folder::FAILURE_FILE;
 
-/// What a method leaves in its folder when it has ended, well or not.
+/// Files that a method writes at its end, with or without success.
 const RESULTS: [&str; 2] = ["run.json", FAILURE_FILE];
 
-/// Runs cells and remembers them.
+/// Runs and saves cells.
 pub struct Bench {
-    /// Where cells and their runs go.
+    /// Folder for cells and runs.
     pub folder: PathBuf,
-    /// This program.
+    /// File of this program.
     pub program: PathBuf,
-    /// CRC-32 of the program: another one runs all cells anew.
+    /// CRC-32 of the program: cells of another program are run again.
     pub program_crc32: String,
-    /// Processes at a time.
+    /// Number of processes at the same time.
     pub jobs: usize,
-    /// Words for every `yfslam run`.
+    /// Options of every `yfslam run`.
     pub extra: Vec<String>,
 }
 
 impl Bench {
-    /// The cells of `groups`, in their order; those that are not done yet are run. `done` is told the number of cells that are.
+    /// Returns the cells of `groups` in their order, and runs those that are missing. `report` gets the number of finished cells.
     ///
     /// # Errors
-    /// A run cannot be started or a cell cannot be written. A method that fails is a cell that says so.
-    pub fn cells(&self, groups: &[Group], done: impl Fn(usize) + Sync) -> Result<Vec<Cell>> {
+    /// A run cannot be started or a cell cannot be written. The failure of a method is stored in its cell.
+    pub fn cells(&self, groups: &[Group], report: impl Fn(usize) + Sync) -> Result<Vec<Cell>> {
         let (next, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let cells = Mutex::new(Vec::new());
         let work = || {
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
                 let Some(group) = groups.get(index) else { return };
-                let found = self.group(group);
+                let result = self.group(group);
                 if let Ok(mut cells) = cells.lock() {
-                    cells.push((index, found));
+                    cells.push((index, result));
                 }
-                done(finished.fetch_add(group.methods.len(), Ordering::Relaxed) + group.methods.len());
+                report(finished.fetch_add(group.methods.len(), Ordering::Relaxed) + group.methods.len());
             }
         };
         std::thread::scope(|scope| (0..self.jobs.max(1)).for_each(|_| drop(scope.spawn(work))));
@@ -55,47 +55,47 @@ impl Bench {
         Ok(groups.into_iter().map(|(_, cells)| cells).collect::<Result<Vec<_>>>()?.concat())
     }
 
-    /// The cells that are there already, and those of a new run of the methods that are missing.
+    /// Returns the cells of a group: saved ones, and those of a new run of the missing methods.
     fn group(&self, group: &Group) -> Result<Vec<Cell>> {
-        let known: Vec<Option<Cell>> = group.methods.iter().map(|method| self.known(group, method)).collect();
+        let saved: Vec<Option<Cell>> = group.methods.iter().map(|method| self.saved(group, method)).collect();
         let missing: Vec<&str> =
-            group.methods.iter().zip(&known).filter(|(_, known)| known.is_none()).map(|(m, _)| m.as_str()).collect();
+            group.methods.iter().zip(&saved).filter(|(_, saved)| saved.is_none()).map(|(m, _)| m.as_str()).collect();
         let together = if missing.is_empty() { None } else { self.run(group, &missing)? };
-        let cell = |(method, known): (&String, Option<Cell>)| {
-            if let Some(cell) = known {
+        let cell = |(method, saved): (&String, Option<Cell>)| {
+            if let Some(cell) = saved {
                 return Ok(cell);
             }
             let folder = self.folder_of(group).join(method);
-            let left_nothing = RESULTS.iter().all(|name| !folder.join(name).exists());
-            // A method that crashed may have taken others along.
+            let has_no_result = RESULTS.iter().all(|name| !folder.join(name).exists());
+            // If a method crashes, it ends the process of the other methods, too.
             let failure =
-                if left_nothing && missing.len() > 1 { self.run(group, &[method])? } else { together.clone() };
+                if has_no_result && missing.len() > 1 { self.run(group, &[method])? } else { together.clone() };
             let arguments = group.arguments(&[method], &self.extra);
             let cell = Cell::of_run(group, method, &folder, failure.as_deref(), arguments, self.program_crc32.clone());
             cell.write(&self.path_of(group, method))?;
             Ok(cell)
         };
-        group.methods.iter().zip(known).map(cell).collect()
+        group.methods.iter().zip(saved).map(cell).collect()
     }
 
-    /// The cell that is there already, of the same program and options.
-    fn known(&self, group: &Group, method: &str) -> Option<Cell> {
-        let known = Cell::read(&self.path_of(group, method))?;
+    /// Returns the saved cell of the same program and options.
+    fn saved(&self, group: &Group, method: &str) -> Option<Cell> {
+        let saved = Cell::read(&self.path_of(group, method))?;
         let same =
-            known.program_crc32 == self.program_crc32 && known.arguments == group.arguments(&[method], &self.extra);
-        same.then_some(known)
+            saved.program_crc32 == self.program_crc32 && saved.arguments == group.arguments(&[method], &self.extra);
+        same.then_some(saved)
     }
 
-    /// Runs some methods of a group, each into a folder of its own. Returns what the program said if it failed as a whole.
+    /// Runs some methods of a group, each into its own folder. Returns the error message of the program if it failed.
     fn run(&self, group: &Group, methods: &[&str]) -> Result<Option<String>> {
         let folder = self.folder_of(group);
         for method in methods {
-            // What an earlier program left must not pass for the result of this one.
+            // Results of an earlier program must not be mistaken for those of this one.
             for name in RESULTS {
                 let _ = std::fs::remove_file(folder.join(method).join(name));
             }
         }
-        // One method alone has no folder of its own in the output folder.
+        // A single method writes directly to the output folder.
         let out = if let [method] = methods { folder.join(method) } else { folder };
         let output = Command::new(&self.program)
             .args(group.arguments(methods, &self.extra))
@@ -104,8 +104,8 @@ impl Bench {
             .arg(&out)
             .output()
             .with_context(|| format!("cannot start {}", self.program.display()))?;
-        let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-        Ok((!output.status.success()).then_some(said))
+        let message = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        Ok((!output.status.success()).then_some(message))
     }
 
     fn folder_of(&self, group: &Group) -> PathBuf {
@@ -123,7 +123,7 @@ mod tests {
 
     use super::*;
 
-    /// A program that crashes with the method `boxes`, and so with several.
+    /// A program that crashes with the method `boxes`, alone or among others.
     const CRASHES: &str = "#!/bin/sh
 case \"$4\" in *boxes*) echo boom >&2; exit 101;; esac
 for out in \"$@\"; do :; done
@@ -132,7 +132,7 @@ echo '{\"evaluation\":{\"ate\":{\"translation_m\":{\"rmse\":0.5}}}}' > \"$out/ru
 ";
 
     #[test]
-    fn a_method_that_crashes_does_not_take_the_others_along() {
+    fn a_method_that_crashes_does_not_prevent_results_of_the_others() {
         let folder = tempfile::tempdir().unwrap();
         let program = folder.path().join("program");
         std::fs::write(&program, CRASHES).unwrap();

@@ -1,4 +1,4 @@
-//! Cells as rows: those of a sequence and a method together, medians over the seeds; and CSV with every cell.
+//! The overview of all cells, with medians over the seeds, and CSV with every cell.
 
 use std::fmt::Write;
 
@@ -7,14 +7,14 @@ use yfslam_report::Table;
 
 use super::cell::Cell;
 
-/// The cells of one sequence and one method, a seed each.
+/// The cells of one sequence and one method, one for each seed.
 pub struct Row<'a> {
     pub sequence: &'a str,
     pub method: &'a str,
     pub cells: Vec<&'a Cell>,
 }
 
-/// One row for each sequence and method, in the order of the cells.
+/// Groups the cells by sequence and method, in their order.
 pub fn rows(cells: &[Cell]) -> Vec<Row<'_>> {
     let mut rows: Vec<Row> = Vec::new();
     for cell in cells {
@@ -27,28 +27,28 @@ pub fn rows(cells: &[Cell]) -> Vec<Row<'_>> {
 }
 
 impl Row<'_> {
-    /// Statistics of a figure over the seeds; `None` if no run has it.
+    /// Returns statistics of a figure over the seeds; `None` if no run has it.
     pub fn over(&self, figure: impl Fn(&Cell) -> Option<f64>) -> Option<Statistics> {
         Statistics::of(&self.cells.iter().filter_map(|cell| figure(cell)).collect::<Vec<_>>())
     }
 
-    /// Median of a figure over the seeds.
+    /// Returns the median of a figure over the seeds.
     pub fn median(&self, figure: impl Fn(&Cell) -> Option<f64>) -> Option<f64> {
         self.over(figure).map(|s| s.median)
     }
 
-    /// Runs without figures.
+    /// Returns the number of runs without results.
     pub fn failures(&self) -> usize {
         self.cells.iter().filter(|cell| cell.failure.is_some()).count()
     }
 }
 
-/// A figure with four decimals, or a dash.
+/// Formats a figure with four decimals, or as a dash.
 pub fn show(figure: Option<f64>) -> String {
     figure.map_or("-".to_owned(), |value| format!("{value:.4}"))
 }
 
-/// What became of each sequence under each method.
+/// Returns the table of the main results of each sequence and method.
 pub fn overview(rows: &[Row]) -> Table {
     let mut table = Table::new([
         "sequence",
@@ -77,7 +77,7 @@ pub fn overview(rows: &[Row]) -> Table {
     table
 }
 
-/// One line for each cell; a figure that is not known is empty.
+/// Returns one line for each cell; unknown figures are empty.
 pub fn csv(cells: &[Cell]) -> String {
     let mut text =
         "sequence,method,seed,ate_rmse_m,ate_std_m,tracked,rpe_frame_m,rpe_second_m,rpe_second_std_m,rpe_second_deg,\
@@ -110,7 +110,7 @@ pub mod tests {
 
     use super::*;
 
-    /// A cell whose figures are all the same.
+    /// A cell for tests; most figures have the same value.
     pub fn cell(sequence: &str, method: &str, seed: u64, ate: Option<f64>) -> Cell {
         Cell {
             sequence: sequence.into(),
