@@ -1,4 +1,4 @@
-//! Being lost and found, maps that outlive a run, and mapping on its own thread.
+//! Relocalisation, loop closing, saved maps, and mapping on its own thread.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -12,7 +12,7 @@ use common::{ate_rmse, fails, report, succeeds};
 use yfslam::map::persist::decode;
 use yfslam_io::write_atomically;
 
-/// A desk without people, seen while the camera moves along its axes.
+/// A desk without people; the camera moves along its axes.
 const DESK: &str = "synth:sitting_xyz?people=0&width=320&height=240&frames=90";
 
 #[test]
@@ -28,12 +28,12 @@ fn a_camera_that_was_covered_is_relocalised_within_ten_frames() {
 }
 
 #[test]
-fn a_camera_lost_at_a_corner_does_not_take_the_next_corridor_for_the_last() {
+fn a_camera_lost_at_a_corner_does_not_confuse_the_next_corridor_with_the_last_one() {
     let folder = tempfile::tempdir().unwrap();
     let world = "synth:corridor_loop?frames=1330&width=320&height=240";
     succeeds(folder.path(), &["run", world, "--end", "275", "--out", "out", "-q"]);
     let report = report(&folder.path().join("out"));
-    // Somebody hides the corner; after it doors and lamps are as they were before, 6 m and a right angle away.
+    // A cover hides the corner; after it, doors and lamps look as before, 6 m and a right angle away.
     assert_eq!(
         report["loops_and_relocalisation"]["lost"][0]["from_ns"], 5_833_333_333_u64,
         "{}",
@@ -42,11 +42,11 @@ fn a_camera_lost_at_a_corner_does_not_take_the_next_corridor_for_the_last() {
     assert!(ate_rmse(&report) < 0.1, "{}", ate_rmse(&report));
 }
 
-/// Once around a block of corridors and a little on, at ten frames a second.
+/// Once around a block of corridors and a little further, at ten frames per second.
 const AROUND: &str = "synth:corridor_loop?people=0&frames=440&fps=10&width=320&height=240";
 
 #[test]
-fn a_way_that_leads_back_closes_its_loop() {
+fn a_path_that_returns_closes_its_loop() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), &["run", AROUND, "--method", "none", "--out", "out", "-q"]);
     let report = report(&folder.path().join("out"));
@@ -58,9 +58,9 @@ fn a_way_that_leads_back_closes_its_loop() {
 }
 
 #[test]
-fn a_camera_put_elsewhere_maps_on_and_joins_both_maps_where_they_meet() {
+fn a_displaced_camera_starts_a_submap_that_is_merged_where_both_meet() {
     let folder = tempfile::tempdir().unwrap();
-    // From the first corridor into the third; the way from there leads back to the first.
+    // From the first corridor into the third; the path from there leads back to the first.
     let fault = ["--fault", "dropped@6+24"];
     succeeds(folder.path(), &[&["run", AROUND, "--method", "none", "--out", "out", "-q"], &fault[..]].concat());
     let report = report(&folder.path().join("out"));
@@ -68,16 +68,16 @@ fn a_camera_put_elsewhere_maps_on_and_joins_both_maps_where_they_meet() {
     assert!(loops.len() == 1 && loops[0]["merged_submaps"] == true, "{loops:?}");
     assert_eq!(report["loops_and_relocalisation"]["frames_in_other_submaps"], 0);
     assert!(report["frames"]["tracked"].as_u64().unwrap() > 150);
-    // Two worlds taken for one would be metres off.
+    // Without merging, the error would be metres.
     assert!(ate_rmse(&report) < 0.15, "{}", ate_rmse(&report));
 }
 
 #[test]
-fn a_map_is_found_back_into_and_stays_as_it_is_or_grows() {
+fn a_saved_map_is_relocalised_in_and_stays_unchanged_or_is_extended() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), &["run", DESK, "--save-map", "desk.map", "--out", "a", "-q"]);
     let before = fs::read(folder.path().join("desk.map")).unwrap();
-    // Noise is enough for a landmark to seem gone.
+    // Noise is enough for a landmark to seem removed.
     let eager = "[dynamic.full]\nthrough_m = 0.001\nthrough_share = 0.0\n";
     fs::write(folder.path().join("eager.toml"), eager).unwrap();
     let again = ["run", DESK, "--load-map", "desk.map", "--reverse", "-q"];
@@ -95,7 +95,7 @@ fn a_map_is_found_back_into_and_stays_as_it_is_or_grows() {
 }
 
 #[test]
-fn a_map_that_cannot_be_used_is_refused_by_name() {
+fn a_map_that_cannot_be_used_is_refused_with_its_name() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), &["run", DESK, "--save-map", "desk.map", "--end", "20", "--out", "a", "-q"]);
     let bytes = fs::read(folder.path().join("desk.map")).unwrap();
@@ -122,10 +122,10 @@ fn mapping_on_its_own_thread_is_as_accurate() {
     assert!(ate_rmse(&report) < 0.015, "{}", ate_rmse(&report));
 }
 
-/// Names the file to write to, for the process that is to be killed.
+/// Environment variable with the file to write, for the process that is killed.
 const VICTIM: &str = "YFSLAM_TEST_VICTIM";
 
-/// Not a test of its own: what [`a_map_survives_a_hundred_killed_writers`] kills.
+/// Not a test of its own: the process that [`a_map_survives_a_hundred_killed_writers`] kills.
 #[test]
 fn victim() {
     let Some(path) = std::env::var_os(VICTIM) else { return };
@@ -146,7 +146,7 @@ fn a_map_survives_a_hundred_killed_writers() {
         let mut writer = Command::new(std::env::current_exe().unwrap());
         let writer = writer.args(["--exact", "victim"]).env(VICTIM, &path).stdout(Stdio::null()).stderr(Stdio::null());
         let mut writer = writer.spawn().unwrap();
-        // From before it writes to its tenth write or so, at a different moment each time.
+        // From before the first write to about the tenth one, at a different moment each time.
         std::thread::sleep(Duration::from_micros(2_000 + 731 * (round * 17 % 100)));
         writer.kill().unwrap();
         writer.wait().unwrap();
