@@ -2,73 +2,73 @@
 
 use yfslam_eval::{Evaluation, StampedPose};
 
-/// What a report is about.
+/// Runs of one or more methods on one sequence.
 #[derive(Clone, Debug)]
 pub struct Report<'a> {
     /// Name of the sequence.
     pub sequence: &'a str,
-    /// What else there is to know of it, as name and value.
+    /// Facts about the sequence, as name and value.
     pub facts: Vec<(&'a str, String)>,
-    /// Stamps of all frames, sorted, ns.
+    /// Time stamps of all frames, sorted, ns.
     pub frames_ns: &'a [i64],
-    /// The true trajectory, sorted by time, if it is known.
+    /// Ground truth, sorted by time, if it is known.
     pub truth: Option<&'a [StampedPose]>,
-    /// The methods; the others are compared with the first.
+    /// Methods; the others are compared with the first one.
     pub methods: Vec<MethodReport<'a>>,
     /// Stages that all methods share, such as rendering.
     pub shared_stages: Vec<Stage>,
-    /// Wall time from the first frame to the last, of everything together, s.
+    /// Wall time of everything together from the first frame to the last, s.
     pub wall_s: f64,
     /// Processor time of the whole process; `None` where it is not known.
     pub processor_time: Option<ProcessorTime>,
     /// Version of the program.
     pub version: &'a str,
-    /// The command that gives this report again.
+    /// Command that produces this report again.
     pub command: String,
 }
 
-/// What one method made of the sequence.
+/// The run of one method.
 #[derive(Clone, Debug)]
 pub struct MethodReport<'a> {
     /// Short name.
     pub name: &'a str,
-    /// What it does, in a few words.
+    /// Description in a few words.
     pub summary: &'a str,
     /// Poses of the tracked frames, sorted by time.
     pub trajectory: &'a [StampedPose],
-    /// Errors of the trajectory; `None` without truth, or if the two cannot be compared.
+    /// Errors of the trajectory; `None` without ground truth, or if the trajectory cannot be evaluated.
     pub evaluation: Option<&'a Evaluation>,
-    /// What became of the frames.
+    /// Counts of frames.
     pub frames: Frames,
-    /// Where the time went.
+    /// Durations.
     pub times: Times,
-    /// Pictures of some moments, in order of time.
-    pub pictures: Vec<Picture>,
-    /// Its dense map, if one was made.
+    /// Snapshots, in order of time.
+    pub snapshots: Vec<Snapshot>,
+    /// Dense map, if one was made.
     pub dense: Option<DenseMap>,
-    /// The configuration, as text.
+    /// Configuration, as text.
     pub config: String,
 }
 
-/// What became of the frames.
+/// Counts of frames.
 #[derive(Clone, Debug, Default)]
 pub struct Frames {
     /// All frames.
     pub total: usize,
-    /// Those whose pose is known.
+    /// Tracked frames.
     pub tracked: usize,
-    /// Those without a pose after the map was begun.
+    /// Frames in which the camera was lost.
     pub lost: usize,
-    /// Those that could not be used, by kind of fault.
+    /// Unusable frames, by kind of fault.
     pub skipped: Vec<(String, usize)>,
 }
 
-/// Where the time went.
+/// Durations.
 #[derive(Clone, Debug, Default)]
 pub struct Times {
     /// Wall time of the stages.
     pub stages: Vec<Stage>,
-    /// Wall time of tracking alone, all frames together, s.
+    /// Wall time of tracking over all frames, s.
     pub tracking_s: f64,
 }
 
@@ -84,9 +84,9 @@ pub struct ProcessorTime {
 /// Wall time of one stage.
 #[derive(Clone, Debug)]
 pub struct Stage {
-    /// Its name.
+    /// Name of the stage.
     pub name: String,
-    /// How often it ran.
+    /// Number of runs.
     pub count: usize,
     /// Median, ms.
     pub median_ms: f64,
@@ -94,36 +94,36 @@ pub struct Stage {
     pub p99_ms: f64,
 }
 
-/// A picture of one moment.
+/// An image of one frame.
 #[derive(Clone, Debug)]
-pub struct Picture {
+pub struct Snapshot {
     /// Number of the frame, from 0.
     pub frame: usize,
-    /// Why this moment is shown, if there is a reason.
+    /// Why this frame is shown, if there is a reason.
     pub note: &'static str,
-    /// The picture as PNG.
+    /// The image as PNG.
     pub png: Vec<u8>,
     /// Width and height, px.
     pub size: [usize; 2],
-    /// Features that were trusted, and those that were not.
+    /// Number of static features, and of dynamic features.
     pub features: [usize; 2],
 }
 
-/// Pictures of a dense map.
+/// Images of a dense map.
 #[derive(Clone, Debug)]
 pub struct DenseMap {
-    /// Keyframes that it is made of.
+    /// Number of its keyframes.
     pub keyframes: usize,
-    /// Voxels that are occupied.
+    /// Number of occupied voxels.
     pub occupied: usize,
     /// Side of a voxel, m.
     pub resolution_m: f32,
-    /// From above and from a corner: as PNG, with width and height, px.
+    /// From above and from a corner: PNG, with width and height, px.
     pub views: [(Vec<u8>, [usize; 2]); 2],
 }
 
 impl Frames {
-    /// Share of all frames whose pose is known, %.
+    /// Returns the share of tracked frames, %.
     pub fn tracked_percent(&self) -> f64 {
         if self.total == 0 { 0.0 } else { 100.0 * self.tracked as f64 / self.total as f64 }
     }

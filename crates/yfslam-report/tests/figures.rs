@@ -1,4 +1,4 @@
-//! Bars and lines of the report are as high as the errors they stand for: read back from the page by the labels of their axes.
+//! Bars and lines of the report have the height of the errors that they show, measured with the labels of the axes.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 #[path = "common/drawing.rs"]
@@ -11,9 +11,9 @@ use drawing::{Drawing, Scale, color, drawings};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use yfslam_eval::{EvalOptions, Evaluation, StampedPose, evaluate};
 
-/// A figure is 5600 units wide, ten a pixel; what is rounded at both ends of a bar or a label is off by so many.
+/// Largest rounding error of a bar or a label in units of the figure, ten of which are a pixel.
 const ROUNDING: f64 = 3.0;
-/// Lines leave out points up to a third of a pixel beside them.
+/// Lines are thinned by up to a third of a pixel.
 const THINNED: f64 = 7.0;
 const FRAMES: i64 = 300;
 
@@ -21,7 +21,7 @@ fn time_s(pose: &StampedPose) -> f64 {
     pose.timestamp_ns as f64 / 1e9
 }
 
-/// The page of `none` and `yf` with their evaluations.
+/// Returns the page of `none` and `yf` with their evaluations.
 fn page(truth: &[StampedPose], estimates: [&[StampedPose]; 2]) -> (String, [Evaluation; 2]) {
     let frames_ns: Vec<i64> = (0..FRAMES).map(|i| i * FRAME_NS).collect();
     let evaluations = estimates.map(|e| evaluate(truth, e, &EvalOptions::default()).unwrap());
@@ -30,7 +30,7 @@ fn page(truth: &[StampedPose], estimates: [&[StampedPose]; 2]) -> (String, [Eval
     (report(&frames_ns, Some(truth), methods).html(), evaluations)
 }
 
-/// Height of a line at a level position, between its points.
+/// Returns the height of a line at a horizontal position, between its points.
 fn height_at(line: &[[f64; 2]], x: f64) -> f64 {
     let k = line.partition_point(|p| p[0] < x).clamp(1, line.len() - 1);
     let ([x0, y0], [x1, y1]) = (line[k - 1], line[k]);
@@ -38,7 +38,7 @@ fn height_at(line: &[[f64; 2]], x: f64) -> f64 {
 }
 
 #[test]
-fn bars_are_as_high_as_the_figures_of_the_table_on_even_and_on_logarithmic_axes() {
+fn bars_are_as_high_as_the_figures_of_the_table_on_linear_and_on_logarithmic_axes() {
     let truth = circles(FRAMES, |_| 0.0, |_| 0.0);
     let good = circles(FRAMES, wobble(0.004), |_| 0.0);
     for (worse_m, is_log) in [(0.015, false), (0.4, true)] {
@@ -60,10 +60,10 @@ fn bars_are_as_high_as_the_figures_of_the_table_on_even_and_on_logarithmic_axes(
                 let ink = color(&html, name);
                 let bar = figure.bars.iter().filter(|bar| bar.fill == ink).min_by_key(nearest).unwrap();
                 let off = bar.y[0] - y.place(value);
-                assert!(off.abs() < ROUNDING, "{name} {group} {value}: the bar says {}", y.value(bar.y[0]));
-                assert_eq!(bar.y[1], base, "{name} {group}: all bars stand on one line");
-                assert!(is_log || (base - y.place(0.0)).abs() < ROUNDING, "an even axis begins at 0");
-                // Each has its figure on top.
+                assert!(off.abs() < ROUNDING, "{name} {group} {value}: the bar shows {}", y.value(bar.y[0]));
+                assert_eq!(bar.y[1], base, "{name} {group}: all bars start at the same height");
+                assert!(is_log || (base - y.place(0.0)).abs() < ROUNDING, "a linear axis begins at 0");
+                // Each bar has its value on top.
                 let on_top = figure.labels.iter().any(|l| {
                     l.text == printed && bar.x[0] < l.x && l.x < bar.x[1] && (20.0..60.0).contains(&(bar.y[0] - l.y))
                 });
@@ -73,7 +73,7 @@ fn bars_are_as_high_as_the_figures_of_the_table_on_even_and_on_logarithmic_axes(
     }
 }
 
-/// Checks a curve against what it stands for at every pose, and returns what it says there.
+/// Checks a curve against the expected values at every pose, and returns the values of the curve.
 fn read_curve(html: &str, figure: &Drawing, name: &str, expected: &[(f64, f64)], slack: f64) -> Vec<f64> {
     let (x, y): (Scale, Scale) = (figure.x(), figure.y());
     let line = figure.line(&color(html, name));
@@ -91,7 +91,7 @@ fn read_curve(html: &str, figure: &Drawing, name: &str, expected: &[(f64, f64)],
 }
 
 #[test]
-fn the_curve_of_translation_is_the_error_of_every_pose_and_its_mean_square_the_figure_of_the_table() {
+fn the_curve_of_translation_shows_the_error_of_every_pose_and_its_rms_is_in_the_table() {
     let truth = circles(FRAMES, |_| 0.0, |_| 0.0);
     let slow = |size: f64| move |t: f64| size * (1.0 + (2.1 * t).sin() + 0.3 * (5.0 * t).cos());
     let (bad, good) = (circles(FRAMES, slow(0.03), |_| 0.0), circles(FRAMES, slow(0.006), |_| 0.0));
@@ -111,16 +111,16 @@ fn the_curve_of_translation_is_the_error_of_every_pose_and_its_mean_square_the_f
 }
 
 #[test]
-fn the_curves_of_roll_pitch_and_yaw_are_the_turns_of_the_camera_about_its_own_axes() {
+fn the_curves_of_roll_pitch_and_yaw_show_rotations_about_the_axes_of_the_camera() {
     let truth = circles(FRAMES, |_| 0.0, |_| 0.0);
-    // Whole periods, many of them: hardly any constant turn for the alignment to take away.
+    // Many whole periods: the alignment removes hardly any constant rotation.
     let period_s = FRAMES as f64 * FRAME_NS as f64 / 1e9;
     let wave = |t: f64, periods: f64| (std::f64::consts::TAU * periods * t / period_s).sin();
     let angles_deg = |t: f64| [2.0 * wave(t, 13.0), 1.2 * wave(t, 17.0), 3.0 * wave(t, 11.0)];
     let turned = |pose: &StampedPose, share: f64| {
         let [roll, pitch, yaw] = angles_deg(time_s(pose)).map(|a| share * a.to_radians());
         let about = |axis, angle| UnitQuaternion::from_axis_angle(&axis, angle);
-        // Ahead is z, right x, down y.
+        // Forward is z, right x, down y.
         let off = about(Vector3::y_axis(), yaw) * about(Vector3::x_axis(), pitch) * about(Vector3::z_axis(), roll);
         let t = pose.t_world_cam;
         StampedPose::new(pose.timestamp_ns, Isometry3::from_parts(t.translation, t.rotation * off))
@@ -136,7 +136,7 @@ fn the_curves_of_roll_pitch_and_yaw_are_the_turns_of_the_camera_about_its_own_ax
     }
 }
 
-/// Distance of a point from a line.
+/// Returns the distance of a point from a line.
 fn distance(line: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
     let to = |pair: &[[f64; 2]]| {
         let ([x0, y0], [dx, dy]) = (pair[0], [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]]);
@@ -147,7 +147,7 @@ fn distance(line: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
 }
 
 #[test]
-fn the_views_show_every_position_where_it_is() {
+fn the_views_show_every_position_at_its_place() {
     let truth = circles(FRAMES, |_| 0.0, |_| 0.0);
     let (bad, good) = (circles(FRAMES, |t| 0.05 * t, |_| 0.0), circles(FRAMES, wobble(0.02), |_| 0.0));
     let (html, evaluations) = page(&truth, [&bad, &good]);

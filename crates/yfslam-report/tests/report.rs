@@ -1,4 +1,4 @@
-//! The page of any input: long, lost, far off, without truth.
+//! Pages of unusual input: long, lost, with large errors, without ground truth.
 
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
@@ -7,7 +7,7 @@ mod common;
 use common::{FRAME_NS, circles, method, report, wobble};
 use yfslam_eval::{EvalOptions, evaluate};
 
-/// Points of all lines of the page.
+/// Returns the number of points of all lines of the page.
 fn points(html: &str) -> usize {
     html.split("points=\"").skip(1).map(|part| part.split('"').next().unwrap().split_whitespace().count()).sum()
 }
@@ -26,20 +26,20 @@ fn half_an_hour_with_a_method_a_thousand_times_worse_stays_small_and_readable() 
     std::fs::write(std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("long.html"), &html).unwrap();
     assert!(html.len() < 1_500_000, "{}", html.len());
     assert!(points(&html) < 60_000 && points(&html) > 5_000, "{}", points(&html));
-    assert!(html.contains("Cut off where an estimate goes far beyond the truth"));
+    assert!(html.contains("Clipped where an estimate is far from the ground truth"));
     assert!(
         html.contains("error, logarithmic")
             && html.contains("ATE, logarithmic")
             && html.contains("error (°), logarithmic")
     );
     assert!(html.contains("A cross is where tracking was lost"));
-    // What the figure of the errors calls the largest is what the table calls so.
+    // The largest error in the figure equals that in the table.
     let largest = of_good.ate.translation_m.max * 1e3;
     assert!(html.contains(&format!("yf {largest:.2} mm")), "{largest}");
 }
 
 #[test]
-fn a_page_without_truth_without_poses_or_without_anything_is_still_a_page() {
+fn a_page_without_ground_truth_without_poses_or_without_methods_is_valid() {
     let frames_ns: Vec<i64> = (0..100).map(|i| i * FRAME_NS).collect();
     let poses = circles(100, |_| 0.0, |_| 0.0);
     let without_truth = report(&frames_ns, None, vec![method("yf", &poses, None)]).html();

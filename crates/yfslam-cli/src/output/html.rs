@@ -69,7 +69,7 @@ fn method<'a>(run: &ReportedRun<'a>, trajectory: &'a [StampedPose]) -> Result<Me
             skipped: tally.skipped_by_reason.iter().map(|(reason, count)| ((*reason).to_owned(), *count)).collect(),
         },
         times: Times { stages: stages(&outcome.stages), tracking_s: outcome.stages.total("frame").as_secs_f64() },
-        pictures: images.snapshots.clone(),
+        snapshots: images.snapshots.clone(),
         dense: images.dense.clone(),
         config: config.to_commented_toml()?,
     })

@@ -4,7 +4,7 @@
 
 use anyhow::Result;
 use yfslam::{Config, RgbdFrame, Slam};
-use yfslam_report::{DenseMap, Picture};
+use yfslam_report::{DenseMap, Snapshot};
 
 use super::dense;
 use super::folder::OutputFolder;
@@ -32,7 +32,7 @@ pub struct Recorder {
 /// Images of one method run for the report.
 #[derive(Clone, Debug, Default)]
 pub struct ReportImages {
-    pub snapshots: Vec<Picture>,
+    pub snapshots: Vec<Snapshot>,
     pub dense: Option<DenseMap>,
 }
 

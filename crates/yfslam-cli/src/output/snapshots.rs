@@ -6,7 +6,7 @@
 use anyhow::Result;
 use yfslam::image::RgbImage;
 use yfslam::{RgbdFrame, Slam};
-use yfslam_report::Picture;
+use yfslam_report::Snapshot as ReportSnapshot;
 
 use super::overlay::draw_frame;
 use crate::draw::indexed_png::to_png;
@@ -56,7 +56,7 @@ impl Snapshots {
     ///
     /// # Errors
     /// An image is too large for PNG.
-    pub fn to_images(&self) -> Result<Vec<Picture>> {
+    pub fn to_images(&self) -> Result<Vec<ReportSnapshot>> {
         let crowded = self.crowded.as_ref().map(|(_, snapshot)| snapshot);
         let mut snapshots: Vec<&Snapshot> = self.taken.iter().collect();
         snapshots.extend(crowded.filter(|crowded| self.taken.iter().all(|taken| taken.frame != crowded.frame)));
@@ -75,10 +75,10 @@ impl Snapshot {
         Self { frame: index, image, features: [features.len() - dynamic, dynamic] }
     }
 
-    fn encode(&self, note: &'static str) -> Result<Picture> {
+    fn encode(&self, note: &'static str) -> Result<ReportSnapshot> {
         let Self { frame, image, features } = self;
         let size = [image.width(), image.height()];
-        Ok(Picture { frame: *frame, note, png: to_png(image)?, size, features: *features })
+        Ok(ReportSnapshot { frame: *frame, note, png: to_png(image)?, size, features: *features })
     }
 }
 

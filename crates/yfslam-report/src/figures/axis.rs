@@ -1,22 +1,22 @@
-//! In: the range of what is to be drawn. Out: an axis: where values lie on it and which of them are labelled.
+//! In: a range of values. Out: an axis, with the positions of values and the labels.
 
-/// How values are spread along an axis.
+/// How values are mapped to positions along an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scale {
-    /// Evenly.
+    /// Linear.
     Linear,
-    /// By their logarithm; for positive values.
+    /// Logarithmic, for positive values.
     Log,
-    /// Evenly up to a threshold on either side of zero, by their logarithm beyond.
+    /// Linear up to a threshold on both sides of zero, logarithmic beyond.
     SymLog(f64),
 }
 
 /// An axis of a figure.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it shows, with unit.
+    /// Quantity and unit.
     pub name: String,
-    /// How values are spread.
+    /// Scale of the axis.
     pub scale: Scale,
     /// First and last position.
     pub range: [f64; 2],
@@ -25,7 +25,7 @@ pub struct Axis {
 }
 
 impl Scale {
-    /// Where a value lies.
+    /// Returns the position of a value.
     pub fn position(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
@@ -39,7 +39,7 @@ impl Scale {
 }
 
 impl Axis {
-    /// An even axis from `from` to `to` with about `count` labels; values are shown times `factor`, to change the unit.
+    /// Returns a linear axis from `from` to `to` with about `count` labels; labels show values times `factor`, to change the unit.
     pub fn linear(name: impl Into<String>, [from, to]: [f64; 2], count: usize, factor: f64) -> Self {
         let step = nice_step((to - from) * factor / count.max(1) as f64);
         let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
@@ -54,7 +54,7 @@ impl Axis {
         Self { name: name.into(), scale: Scale::Linear, range: [from, to], ticks }
     }
 
-    /// A logarithmic axis of lengths in metres; labels are powers of ten, or also their double and fivefold where that would be few.
+    /// Returns a logarithmic axis of lengths in metres; labels are powers of ten, and 2 and 5 times these where there would be few.
     pub fn log_lengths(name: impl Into<String>, [from, to]: [f64; 2]) -> Self {
         let low = from.max(1e-9).log10();
         let high = to.max(1e-9).log10().max(low + 1.0);
@@ -69,7 +69,7 @@ impl Axis {
         Self { name: name.into(), scale: Scale::Log, range: [low, high], ticks }
     }
 
-    /// An axis of angles in degrees to either side of zero, logarithmic beyond `threshold`, which is a power of ten.
+    /// Returns an axis of angles in degrees on both sides of zero, logarithmic beyond `threshold`, which is a power of ten.
     pub fn symlog_degrees(name: impl Into<String>, limit: f64, threshold: f64) -> Self {
         let scale = Scale::SymLog(threshold);
         let decades = (limit / threshold).log10().ceil().max(1.0) as i32;
@@ -81,14 +81,14 @@ impl Axis {
         Self { name: name.into(), scale, range: [-end, end], ticks }
     }
 
-    /// An axis of named groups, one a unit apart.
+    /// Returns an axis of named groups at a distance of one unit.
     pub fn groups(names: &[&str]) -> Self {
         let ticks = names.iter().enumerate().map(|(i, name)| (i as f64, (*name).to_owned())).collect();
         Self { name: String::new(), scale: Scale::Linear, range: [-0.55, names.len() as f64 - 0.45], ticks }
     }
 }
 
-/// Unit in which lengths up to `max_m` are easy to read, and how many of it a metre has.
+/// Returns the unit for lengths up to `max_m`, and its number in a metre.
 pub fn length_unit(max_m: f64) -> (&'static str, f64) {
     match max_m {
         m if m < 0.05 => ("mm", 1e3),
@@ -97,7 +97,7 @@ pub fn length_unit(max_m: f64) -> (&'static str, f64) {
     }
 }
 
-/// A length in metres as people say it, with three digits.
+/// Formats a length with three digits in a suitable unit.
 pub fn length(m: f64) -> String {
     match m {
         m if m < 0.000_999_5 => format!("{} µm", short(m * 1e6)),
@@ -107,7 +107,7 @@ pub fn length(m: f64) -> String {
     }
 }
 
-/// Three significant digits.
+/// Formats a number with three significant digits.
 fn short(value: f64) -> String {
     let decimals = match value {
         v if v >= 99.95 => 0,
@@ -117,14 +117,14 @@ fn short(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// Without zeros behind the point.
+/// Removes trailing zeros of the decimals.
 fn trimmed(length: &str) -> String {
     let Some((number, unit)) = length.split_once(' ') else { return length.to_owned() };
     let number = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number };
     format!("{number} {unit}")
 }
 
-/// The 1, 2 or 5 times a power of ten that is near `rough`.
+/// Returns 1, 2 or 5 times a power of ten near `rough`.
 fn nice_step(rough: f64) -> f64 {
     let rough = if rough.is_finite() && rough > 0.0 { rough } else { 1.0 };
     let power = 10f64.powf(rough.log10().floor());
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn even_axes_have_round_labels_inside_the_range() {
+    fn linear_axes_have_round_labels_inside_the_range() {
         assert_eq!(labels(&Axis::linear("", [-0.3, 1.1], 4, 1.0)), ["0.0", "0.5", "1.0"]);
         assert_eq!(labels(&Axis::linear("", [0.0, 0.0213], 4, 1e3)), ["0", "5", "10", "15", "20"]);
         assert_eq!(labels(&Axis::linear("", [-20.0, 20.0], 4, 1.0)), ["−20", "−10", "0", "10", "20"]);
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithmic_axes_name_lengths_in_their_own_unit() {
+    fn logarithmic_axes_label_each_length_in_a_suitable_unit() {
         assert_eq!(labels(&Axis::log_lengths("", [0.0009, 1.3])), ["1 mm", "1 cm", "10 cm", "1 m"]);
         assert_eq!(labels(&Axis::log_lengths("", [0.003, 0.06])), ["5 mm", "1 cm", "2 cm", "5 cm"]);
         assert_eq!(length(0.0156), "1.56 cm");

@@ -9,7 +9,7 @@ const HEIGHT: f64 = 330.0;
 /// Width of a bar, as a share of the distance between two groups of bars.
 const WIDEST_BAR: f64 = 0.24;
 
-/// The bars; `None` if there is nothing to compare.
+/// Draws the bars; `None` if fewer than two methods have errors.
 pub fn bars(report: &Report, scene: &Scene) -> Option<Captioned> {
     let methods: Vec<_> = scene
         .methods
@@ -29,8 +29,8 @@ pub fn bars(report: &Report, scene: &Scene) -> Option<Captioned> {
     };
     let width = (0.8 / methods.len() as f64).min(WIDEST_BAR);
     let mut marks = Vec::new();
-    for (place, (drawn, s)) in methods.iter().enumerate() {
-        let offset = (place as f64 - (methods.len() as f64 - 1.0) / 2.0) * width;
+    for (index, (drawn, s)) in methods.iter().enumerate() {
+        let offset = (index as f64 - (methods.len() as f64 - 1.0) / 2.0) * width;
         for (group, height) in [(0.0, s.rmse), (1.0, s.std)] {
             let [from, to] = [group + offset - 0.44 * width, group + offset + 0.44 * width];
             marks.push(Mark::Bar { from, to, height, ink: drawn.ink, text: format!("{height:.4}") });

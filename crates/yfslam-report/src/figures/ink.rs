@@ -1,14 +1,14 @@
-//! In: what is drawn. Out: its colour, on a light and on a dark page.
+//! In: an element of a figure. Out: its colour on a light and on a dark page.
 //!
-//! Figures are drawn in the light colours; a rule of the page's style sheet for each of them puts the dark one in its place. So a figure
-//! that is cut out of the page still has its colours.
+//! Figures are drawn in the light colours, and rules of the style sheet replace them on a dark page. A figure that is copied out of the page
+//! keeps its colours.
 
 use std::fmt::Write;
 
 /// Red, green, blue.
 pub type Rgb = [u8; 3];
 
-/// What a stroke or an area of a figure stands for.
+/// What a line or an area of a figure shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ink {
     /// Text on axes.
@@ -19,11 +19,11 @@ pub enum Ink {
     Grid,
     /// The true trajectory.
     Truth,
-    /// A method, by its place in [`METHODS`].
+    /// A method, by its index in [`METHODS`].
     Method(usize),
 }
 
-/// Light and dark colours of methods; told apart with any kind of colour vision (the first three by luminance as well).
+/// Light and dark colours of methods, distinguishable with every kind of colour vision (the first three by luminance, too).
 const METHODS: [[Rgb; 2]; 7] = [
     [[201, 79, 17], [255, 146, 76]],
     [[118, 75, 205], [183, 155, 255]],
@@ -35,8 +35,8 @@ const METHODS: [[Rgb; 2]; 7] = [
 ];
 
 impl Ink {
-    /// The colour of a method: the same in every report for those that the program has, else by its place in this one.
-    pub fn method(name: &str, place: usize) -> Self {
+    /// Returns the colour of a method: fixed for the known methods, else by its index in the report.
+    pub fn method(name: &str, index: usize) -> Self {
         Self::Method(match name {
             "none" => 0,
             "boxes" => 1,
@@ -45,23 +45,23 @@ impl Ink {
             "ds" => 4,
             "dyna" => 5,
             "dms" => 6,
-            _ => 3 + place % (METHODS.len() - 3),
+            _ => 3 + index % (METHODS.len() - 3),
         })
     }
 
-    /// Colour on a light page.
+    /// Returns the colour on a light page.
     pub fn light(self) -> Rgb {
         self.colors()[0]
     }
 
-    /// Name of the variable of the style sheet that holds the colour.
+    /// Returns the name of the variable of the style sheet with this colour.
     pub fn variable(self) -> String {
         match self {
             Self::Text => "--ink-text".into(),
             Self::Axis => "--ink-axis".into(),
             Self::Grid => "--ink-grid".into(),
             Self::Truth => "--ink-truth".into(),
-            Self::Method(place) => format!("--ink-method-{place}"),
+            Self::Method(index) => format!("--ink-method-{index}"),
         }
     }
 
@@ -71,7 +71,7 @@ impl Ink {
             Self::Axis => [[156, 163, 175], [90, 99, 112]],
             Self::Grid => [[229, 231, 235], [44, 51, 61]],
             Self::Truth => [[31, 41, 55], [229, 233, 240]],
-            Self::Method(place) => METHODS.get(place).copied().unwrap_or(METHODS[0]),
+            Self::Method(index) => METHODS.get(index).copied().unwrap_or(METHODS[0]),
         }
     }
 
@@ -80,7 +80,7 @@ impl Ink {
     }
 }
 
-/// The part of the style sheet that defines all colours, and gives figures those of the page.
+/// Returns the part of the style sheet that defines the colours, and applies them to figures.
 pub fn style() -> String {
     let (mut light, mut dark, mut figures) = (String::new(), String::new(), String::new());
     for ink in Ink::all() {
@@ -94,7 +94,7 @@ pub fn style() -> String {
     format!(":root{{{light}}}\n@media screen and (prefers-color-scheme: dark){{:root{{{dark}}}}}\n{figures}")
 }
 
-/// As the drawing backend writes it, which the rules of the style sheet have to match.
+/// Formats a colour as the drawing backend does, because the rules of the style sheet have to match it.
 fn hex([r, g, b]: Rgb) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_method_keeps_its_colour_whatever_it_is_compared_with() {
+    fn a_method_has_the_same_colour_in_every_comparison() {
         assert_eq!(Ink::method("yf", 0), Ink::method("yf", 2));
         assert_ne!(Ink::method("other", 0), Ink::method("yf", 2));
         assert!(METHODS.len() > 3);

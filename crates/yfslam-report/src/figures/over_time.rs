@@ -1,15 +1,15 @@
-//! In: errors of all methods. Out: how they change over time (paper Fig. 5 d to f).
+//! In: errors of all methods. Out: figures of the errors over time (paper Fig. 5 d to f).
 
 use super::axis::{Axis, length, length_unit};
 use super::ink::Ink;
 use super::path::Point;
 use super::plot::{Figure, Mark};
 use super::scene::{Captioned, Drawn, LOG_FROM_RATIO, Scene, WIDTH};
-use super::series::Off;
+use super::series::ErrorAt;
 
 const HEIGHT: f64 = 250.0;
 
-/// Translation, roll, pitch and yaw; none without truth.
+/// Draws errors of translation, roll, pitch and yaw; no figures without ground truth.
 pub fn over_time(scene: &Scene) -> Vec<Captioned> {
     let mut figures: Vec<Captioned> = translation(scene).into_iter().collect();
     let names = ["Roll error", "Pitch error", "Yaw error"];
@@ -18,7 +18,7 @@ pub fn over_time(scene: &Scene) -> Vec<Captioned> {
 }
 
 fn translation(scene: &Scene) -> Option<Captioned> {
-    let of = |off: &Off| off.translation_m;
+    let of = |error: &ErrorAt| error.translation_m;
     let worst = largest(scene, of)?;
     let rms: Vec<f64> = scene.methods.iter().filter_map(|m| root_mean_square(m, of)).collect();
     let best = rms.iter().copied().fold(f64::INFINITY, f64::min);
@@ -38,8 +38,8 @@ fn translation(scene: &Scene) -> Option<Captioned> {
 }
 
 fn angle(scene: &Scene, name: &'static str, k: usize) -> Option<Captioned> {
-    let of = move |off: &Off| off.rotation_deg[k];
-    let size = move |off: &Off| off.rotation_deg[k].abs();
+    let of = move |error: &ErrorAt| error.rotation_deg[k];
+    let size = move |error: &ErrorAt| error.rotation_deg[k].abs();
     let worst = largest(scene, size)?;
     let each: Vec<(&str, f64)> = scene
         .methods
@@ -58,7 +58,7 @@ fn angle(scene: &Scene, name: &'static str, k: usize) -> Option<Captioned> {
     Some(figure(scene, name, axis, note, of))
 }
 
-fn figure(scene: &Scene, title: &str, y: Axis, note: String, of: impl Fn(&Off) -> f64) -> Captioned {
+fn figure(scene: &Scene, title: &str, y: Axis, note: String, of: impl Fn(&ErrorAt) -> f64) -> Captioned {
     let mut marks = Vec::new();
     for method in &scene.methods {
         let spans = method.series.lost.iter().map(|&[from, to]| Mark::Span { from, to, ink: method.ink });
@@ -69,8 +69,8 @@ fn figure(scene: &Scene, title: &str, y: Axis, note: String, of: impl Fn(&Off) -
         marks.push(Mark::Line { points, ink: Ink::Axis, width: 1.0, opacity: 1.0 });
     }
     for method in &scene.methods {
-        let line = |part: &Vec<Off>| {
-            let points: Vec<Point> = part.iter().map(|off| [off.time_s, of(off)]).collect();
+        let line = |part: &Vec<ErrorAt>| {
+            let points: Vec<Point> = part.iter().map(|error| [error.time_s, of(error)]).collect();
             Mark::Line { points, ink: method.ink, width: 1.5, opacity: 1.0 }
         };
         marks.extend(method.series.errors.iter().map(line));
@@ -80,12 +80,12 @@ fn figure(scene: &Scene, title: &str, y: Axis, note: String, of: impl Fn(&Off) -
     Captioned { svg: figure.svg(), title: title.into(), note }
 }
 
-fn largest(scene: &Scene, of: impl Fn(&Off) -> f64) -> Option<f64> {
+fn largest(scene: &Scene, of: impl Fn(&ErrorAt) -> f64) -> Option<f64> {
     scene.methods.iter().flat_map(|m| m.series.all_errors()).map(of).reduce(f64::max)
 }
 
-fn root_mean_square(method: &Drawn, of: impl Fn(&Off) -> f64) -> Option<f64> {
-    let errors = method.series.all_errors().map(|off| of(off) * of(off));
+fn root_mean_square(method: &Drawn, of: impl Fn(&ErrorAt) -> f64) -> Option<f64> {
+    let errors = method.series.all_errors().map(|error| of(error) * of(error));
     let count = errors.clone().count();
     (count > 0).then(|| (errors.sum::<f64>() / count as f64).sqrt())
 }

@@ -1,4 +1,4 @@
-//! In: axes and marks in their units. Out: a figure as SVG; the only place that knows the plotting library.
+//! In: axes and marks in their units. Out: a figure as SVG. Only this file uses the plotting library.
 
 use std::ops::Range;
 
@@ -10,9 +10,9 @@ use super::axis::Axis;
 use super::ink::Ink;
 use super::path::{Point, clip, thin};
 
-/// The library places everything on whole pixels; drawn this much larger, nothing looks stepped.
+/// The library rounds positions to whole pixels; figures are drawn this many times larger to avoid visible steps.
 const FINE: f64 = 10.0;
-/// Points that one line may have in the figure: more than there are pixel columns.
+/// Largest number of points of a line: more than there are pixel columns.
 const MOST_POINTS: usize = 2500;
 /// Space for labels and names of the axes, px.
 const LEFT: f64 = 70.0;
@@ -21,23 +21,23 @@ const MARGIN: f64 = 12.0;
 /// Size of labels, px.
 const TEXT: f64 = 12.5;
 
-/// One thing in a figure; positions in units of the axes, before their scale.
+/// An element of a figure; positions in units of the axes, before their scale.
 pub enum Mark {
     /// A line; `width` in px.
     Line { points: Vec<Point>, ink: Ink, width: f64, opacity: f64 },
-    /// A span of the horizontal axis.
+    /// An interval of the horizontal axis.
     Span { from: f64, to: f64, ink: Ink },
     /// A dot; `radius` in px.
     Dot { at: Point, ink: Ink, radius: f64 },
     /// A cross; `radius` in px.
     Cross { at: Point, ink: Ink, radius: f64 },
-    /// An upright bar from the lower end of the axis, with a text on top.
+    /// A vertical bar from the lower end of the axis, with a text on top.
     Bar { from: f64, to: f64, height: f64, ink: Ink, text: String },
 }
 
-/// A figure: two axes and what lies between them, drawn in order.
+/// A figure: two axes and the marks between them, drawn in order.
 pub struct Figure {
-    /// What it shows, for those who cannot see it.
+    /// Description for screen readers.
     pub description: String,
     /// Whole width and height, px.
     pub size: [f64; 2],
@@ -49,18 +49,18 @@ pub struct Figure {
 type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-/// Pixels between the axes of a figure of this size.
+/// Returns the size of the plot in a figure of this size, px.
 pub fn plot_size([width, height]: [f64; 2]) -> [f64; 2] {
     [width - LEFT - 2.0 * MARGIN, height - BELOW - 2.0 * MARGIN]
 }
 
-/// Height of a figure whose plot is `plot_height` px high.
+/// Returns the height of a figure with a plot of `plot_height`, px.
 pub fn height_for(plot_height: f64) -> f64 {
     plot_height + BELOW + 2.0 * MARGIN
 }
 
 impl Figure {
-    /// The figure as an SVG element; empty if the library cannot draw it.
+    /// Returns the figure as an SVG element; empty if the library cannot draw it.
     pub fn svg(&self) -> String {
         let mut svg = String::new();
         match self.draw(&mut svg) {
@@ -141,7 +141,7 @@ impl Figure {
         Ok(())
     }
 
-    /// Positions on the axes.
+    /// Returns positions on the axes.
     fn place(&self, [x, y]: Point) -> Point {
         [self.x.scale.position(x), self.y.scale.position(y)]
     }
@@ -152,7 +152,7 @@ impl Figure {
         (holds(self.x.range, x) && holds(self.y.range, y)).then_some((x, y))
     }
 
-    /// The parts of a line between the axes, in as few points as show it all.
+    /// Returns the parts of a line between the axes, thinned.
     fn visible(&self, points: &[Point]) -> Vec<Vec<(f64, f64)>> {
         let plot = plot_size(self.size);
         let px_per_unit = [self.x.range, self.y.range].map(|[low, high]| 1.0 / (high - low).max(f64::MIN_POSITIVE));

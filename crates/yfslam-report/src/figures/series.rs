@@ -1,41 +1,41 @@
-//! In: what a report is given. Out: what its figures draw: trajectories in one world, errors over time, stretches without a pose.
+//! In: a report. Out: what its figures show of a method: trajectory in one world frame, errors over time, periods without a pose.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::orientation::{Mount, mean_turn};
+use super::orientation::{BodyRotation, mean_rotation};
 use crate::content::{MethodReport, Report};
 use yfslam_eval::{Alignment, Match, StampedPose, associate};
 
-/// So many frames in a row without a pose count as a stretch: a frame that the sensor dropped is none.
-const SHORTEST_STRETCH: usize = 3;
-/// How far before the first frame, and after the last one, the truth is shown, ns.
+/// Least number of consecutive frames without a pose that count as lost: single frames may have been dropped by the sensor.
+const SHORTEST_LOSS: usize = 3;
+/// Time before the first and after the last frame for which the ground truth is shown, ns.
 const MARGIN_NS: i64 = 50_000_000;
 
-/// Where the camera is at a time.
+/// Position of the camera at a time.
 #[derive(Clone, Copy, Debug)]
 pub struct At {
     pub time_s: f64,
     pub position_m: Vector3<f64>,
-    /// The direction that is up in its picture, in the world.
+    /// Up direction of its image, in the world.
     pub up: Vector3<f64>,
 }
 
-/// How far an estimate is off at one time, after alignment.
+/// Error of an estimate at a time, after alignment.
 #[derive(Clone, Copy, Debug)]
-pub struct Off {
+pub struct ErrorAt {
     pub time_s: f64,
     pub translation_m: f64,
     /// Roll, pitch and yaw of the camera about its viewing direction, its right and its down, degrees.
     pub rotation_deg: [f64; 3],
 }
 
-/// What the figures show of one method.
+/// What figures show of one method.
 pub struct Series {
-    /// Unbroken parts of the trajectory, in the world of the truth; empty if it cannot be aligned to it.
+    /// Connected parts of the trajectory in the world of the ground truth; empty if it cannot be aligned.
     pub track: Vec<Vec<At>>,
     /// Errors, in the same parts.
-    pub errors: Vec<Vec<Off>>,
-    /// Stretches of time without a pose, s.
+    pub errors: Vec<Vec<ErrorAt>>,
+    /// Periods without a pose, s.
     pub lost: Vec<[f64; 2]>,
 }
 
@@ -46,7 +46,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// The clock of the frames of a report.
+    /// Returns the clock of a report.
     pub fn new(report: &Report) -> Self {
         let poses = report.methods.iter().flat_map(|m| m.trajectory).map(|p| p.timestamp_ns);
         let stamps = || report.frames_ns.iter().copied();
@@ -54,7 +54,7 @@ impl Clock {
         Self { first_ns, last_ns: stamps().chain(poses).max().unwrap_or(first_ns) }
     }
 
-    /// Time of the last frame, s.
+    /// Returns the time of the last frame, s.
     pub fn end_s(&self) -> f64 {
         self.seconds(self.last_ns)
     }
@@ -68,16 +68,16 @@ impl Clock {
         At { time_s: self.seconds(pose.timestamp_ns), position_m: pose.t_world_cam.translation.vector, up }
     }
 
-    /// The part of the truth that the frames span.
-    pub fn truth(&self, truth: &[StampedPose], mount: &Mount) -> Vec<At> {
+    /// Returns the part of the ground truth in the time of the frames.
+    pub fn truth(&self, truth: &[StampedPose], body_rotation: &BodyRotation) -> Vec<At> {
         let span = self.first_ns.saturating_sub(MARGIN_NS)..=self.last_ns.saturating_add(MARGIN_NS);
-        truth.iter().filter(|p| span.contains(&p.timestamp_ns)).map(|p| self.at(&mount.camera(p))).collect()
+        truth.iter().filter(|p| span.contains(&p.timestamp_ns)).map(|p| self.at(&body_rotation.camera(p))).collect()
     }
 }
 
 impl Series {
-    /// What there is to draw of a method.
-    pub fn new(report: &Report, method: &MethodReport, clock: &Clock, mount: &Mount) -> Self {
+    /// Prepares the data of a method.
+    pub fn new(report: &Report, method: &MethodReport, clock: &Clock, body_rotation: &BodyRotation) -> Self {
         let gaps = gaps(report.frames_ns, method.trajectory);
         let lost = gaps.iter().map(|gap| gap.map(|t| clock.seconds(t))).collect();
         let alignment = match (report.truth, method.evaluation) {
@@ -86,21 +86,21 @@ impl Series {
         };
         let moved = |pose: &StampedPose| alignment.map_or(*pose, |a| a.apply(pose));
         let track = method.trajectory.iter().map(|pose| clock.at(&moved(pose))).collect();
-        let errors = alignment.map_or(Vec::new(), |alignment| errors(report, method, &alignment, clock, mount));
+        let errors = alignment.map_or(Vec::new(), |alignment| errors(report, method, &alignment, clock, body_rotation));
         Self {
             track: split(track, &lost, |at: &At| at.time_s),
-            errors: split(errors, &lost, |off: &Off| off.time_s),
+            errors: split(errors, &lost, |error: &ErrorAt| error.time_s),
             lost,
         }
     }
 
-    /// All errors, in order of time.
-    pub fn all_errors(&self) -> impl Iterator<Item = &Off> + Clone {
+    /// Returns all errors, in order of time.
+    pub fn all_errors(&self) -> impl Iterator<Item = &ErrorAt> + Clone {
         self.errors.iter().flatten()
     }
 }
 
-/// From the last pose before to the first pose after each stretch of frames without a pose, ns.
+/// Returns the periods without a pose, each from the last pose before it to the first pose after it, ns.
 fn gaps(frames_ns: &[i64], trajectory: &[StampedPose]) -> Vec<[i64; 2]> {
     let (Some(&first), Some(&last)) = (frames_ns.first(), frames_ns.last()) else { return Vec::new() };
     let mut ends = vec![first - 1];
@@ -110,40 +110,46 @@ fn gaps(frames_ns: &[i64], trajectory: &[StampedPose]) -> Vec<[i64; 2]> {
         frames_ns.partition_point(|t| *t < to).saturating_sub(frames_ns.partition_point(|t| *t <= from))
     };
     let pairs = ends.windows(2).filter_map(|pair| <[i64; 2]>::try_from(pair).ok());
-    pairs.filter(|&[from, to]| frames_between(from, to) >= SHORTEST_STRETCH).collect()
+    pairs.filter(|&[from, to]| frames_between(from, to) >= SHORTEST_LOSS).collect()
 }
 
-fn errors(report: &Report, method: &MethodReport, alignment: &Alignment, clock: &Clock, mount: &Mount) -> Vec<Off> {
+fn errors(
+    report: &Report,
+    method: &MethodReport,
+    alignment: &Alignment,
+    clock: &Clock,
+    body_rotation: &BodyRotation,
+) -> Vec<ErrorAt> {
     let (Some(truth), Some(evaluation)) = (report.truth, method.evaluation) else { return Vec::new() };
     let mut matches = associate(truth, method.trajectory, evaluation.max_diff_ns).unwrap_or_default();
-    matches.iter_mut().for_each(|m| m.reference = mount.camera(&m.reference));
-    let turn = mean_turn(&matches);
-    let off = |m: &Match| {
+    matches.iter_mut().for_each(|m| m.reference = body_rotation.camera(&m.reference));
+    let turn = mean_rotation(&matches);
+    let error = |m: &Match| {
         let (truth, estimate) = (m.reference.t_world_cam, m.estimate.t_world_cam);
         let aligned = alignment.apply(&m.estimate).t_world_cam;
-        Off {
+        ErrorAt {
             time_s: clock.seconds(m.estimate.timestamp_ns),
             translation_m: (truth.translation.vector - aligned.translation.vector).norm(),
             rotation_deg: roll_pitch_yaw_deg(&(truth.rotation.inverse() * turn * estimate.rotation)),
         }
     };
-    matches.iter().map(off).collect()
+    matches.iter().map(error).collect()
 }
 
-/// Angles of a rotation in the camera's frame (x right, y down, z ahead): roll about z, pitch about x, yaw about y.
+/// Returns the angles of a rotation in the camera frame (x right, y down, z forward): roll about z, pitch about x, yaw about y.
 fn roll_pitch_yaw_deg(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
-    // In the axes ahead, right, down these are the usual Euler angles.
+    // In the axes forward, right, down these are the usual Euler angles.
     let q = Quaternion::new(rotation.w, rotation.k, rotation.i, rotation.j);
     let (roll, pitch, yaw) = UnitQuaternion::new_unchecked(q).euler_angles();
     [roll, pitch, yaw].map(f64::to_degrees)
 }
 
-/// Cuts a row of values in order of time at the stretches that nothing is known of.
+/// Splits values in order of time at the periods without a pose.
 fn split<T>(values: Vec<T>, lost: &[[f64; 2]], time_s: impl Fn(&T) -> f64) -> Vec<Vec<T>> {
     let mut parts: Vec<Vec<T>> = Vec::new();
     let mut before = None;
     for value in values {
-        // How many stretches are over at this time tells in which part it belongs.
+        // The number of periods that have ended gives the part to which a value belongs.
         let over = lost.partition_point(|[_, to]| *to <= time_s(&value) + 1e-6);
         match parts.last_mut() {
             Some(part) if before == Some(over) => part.push(value),
@@ -164,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn three_frames_without_a_pose_are_a_stretch_and_two_are_not() {
+    fn three_frames_without_a_pose_are_a_loss_and_two_are_not() {
         let frames_ns: Vec<i64> = (0..20).map(|i| i * 33).collect();
         let trajectory = poses([0, 1, 4, 8, 9, 10, 11, 12, 13, 14, 15, 16]);
         assert_eq!(gaps(&frames_ns, &trajectory), [[4 * 33, 8 * 33], [16 * 33, 19 * 33 + 1]]);
@@ -175,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn roll_is_about_the_viewing_direction_pitch_about_the_right_and_yaw_about_down() {
+    fn roll_is_about_the_viewing_direction_pitch_about_right_and_yaw_about_down() {
         let angles = |axis: Vector3<f64>| {
             roll_pitch_yaw_deg(&UnitQuaternion::new(axis * 10f64.to_radians())).map(|a| (a * 1e6).round() / 1e6)
         };

@@ -1,4 +1,4 @@
-//! In: the true and the estimated trajectories in one world. Out: views from above and from the side (paper Fig. 5 a to c).
+//! In: true and estimated trajectories in one world frame. Out: views from above and from the side (paper Fig. 5 a to c).
 
 use nalgebra::Vector3;
 
@@ -9,10 +9,10 @@ use super::plot::{Figure, Mark, height_for, plot_size};
 use super::scene::{Captioned, Scene, WIDTH, bounds};
 use super::series::At;
 
-/// Estimates may take this many times the space of the truth before they are cut off: a method that is 50 times worse would else
-/// leave a dot of the others.
+/// Extent of a view relative to that of the ground truth, beyond which estimates are clipped: otherwise a very large error of one method
+/// would shrink the other trajectories to a dot.
 const ROOM: f64 = 2.5;
-/// Least extent that is shown, m.
+/// Smallest extent of a view, m.
 const LEAST_M: f64 = 0.02;
 
 /// A direction in the world and its name.
@@ -27,7 +27,7 @@ impl Direction {
     }
 }
 
-/// Both views; none without a trajectory.
+/// Draws both views; no view without a trajectory.
 pub fn views(scene: &Scene) -> Vec<Captioned> {
     let [first, second, up] = directions(scene);
     let spread = |d: &Direction| bounds(shown(scene).map(|at| d.of(at))).map_or(0.0, |[low, high]| high - low);
@@ -40,7 +40,7 @@ fn view(scene: &Scene, title: &str, x: &Direction, y: &Direction) -> Option<Capt
     let extent_m = |d| bounds(shown(scene).map(|at| Direction::of(d, at))).map(|[low, high]| high - low);
     let room_m = (ROOM - 1.0) / 2.0 * extent_m(x)?.max(extent_m(y)?).max(LEAST_M);
     let ((x_range, x_cut), (y_range, y_cut)) = (range(scene, x, room_m)?, range(scene, y, room_m)?);
-    // The same scale on both axes: as high as the width allows, within reason.
+    // Both axes have the same scale; the height follows from the width within limits.
     let [plot_width, _] = plot_size([WIDTH, WIDTH]);
     let extent = |[low, high]: [f64; 2]| (high - low).max(LEAST_M) * 1.12;
     let plot_height = (plot_width * extent(y_range) / extent(x_range)).clamp(180.0, 380.0);
@@ -56,7 +56,7 @@ fn view(scene: &Scene, title: &str, x: &Direction, y: &Direction) -> Option<Capt
         y: Axis::linear(format!("{} (m)", y.name), around(y_range, plot_height), (plot_height / 55.0) as usize, 1.0),
         marks: marks(scene, |at| [x.of(at), y.of(at)]),
     };
-    let note = if x_cut || y_cut { "Cut off where an estimate goes far beyond the truth." } else { "" };
+    let note = if x_cut || y_cut { "Clipped where an estimate is far from the ground truth." } else { "" };
     Some(Captioned { svg: figure.svg(), title: title.into(), note: note.into() })
 }
 
@@ -82,7 +82,7 @@ fn marks(scene: &Scene, flat: impl Fn(&At) -> Point) -> Vec<Mark> {
     marks
 }
 
-/// The truth, or else the estimates.
+/// Returns the ground truth, or else the estimates.
 fn shown<'a>(scene: &'a Scene) -> Box<dyn Iterator<Item = &'a At> + 'a> {
     match &scene.truth {
         Some(truth) => Box::new(truth.iter()),
@@ -90,7 +90,7 @@ fn shown<'a>(scene: &'a Scene) -> Box<dyn Iterator<Item = &'a At> + 'a> {
     }
 }
 
-/// What is shown along a direction, at most `room` on either side of the truth, and whether estimates reach beyond it.
+/// Returns the range along a direction, at most `room` beyond the ground truth, and whether estimates are clipped.
 fn range(scene: &Scene, direction: &Direction, room: f64) -> Option<([f64; 2], bool)> {
     let [low, high] = bounds(shown(scene).map(|at| direction.of(at)))?;
     let all = scene.methods.iter().flat_map(|m| m.series.track.iter().flatten());
@@ -102,7 +102,7 @@ fn range(scene: &Scene, direction: &Direction, room: f64) -> Option<([f64; 2], b
     })
 }
 
-/// Two level directions, the second to the left of the first, and up: the axis of the world that is most up in the pictures.
+/// Returns two horizontal directions, the second to the left of the first, and up: the world axis nearest to the up direction of the images.
 fn directions(scene: &Scene) -> [Direction; 3] {
     const NAMES: [&str; 3] = ["x", "y", "z"];
     let up: Vector3<f64> = shown(scene).map(|at| at.up).sum();

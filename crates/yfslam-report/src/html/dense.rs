@@ -1,4 +1,4 @@
-//! In: pictures of dense maps. Out: the section that shows them, method beside method.
+//! In: images of dense maps. Out: the section that shows them, with the methods side by side.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use crate::content::{DenseMap, MethodReport, Report};
 use crate::figures::ink::Ink;
 
-/// The section; nothing if no method has a dense map.
+/// Returns the section; empty if no method has a dense map.
 pub fn dense(report: &Report) -> Markup {
     let maps: Vec<_> = report.methods.iter().enumerate().filter_map(|(i, m)| Some((i, m, m.dense.as_ref()?))).collect();
     if maps.is_empty() {
@@ -17,18 +17,18 @@ pub fn dense(report: &Report) -> Markup {
     html! {
         section #dense {
             h2 { "Dense map" }
-            p.about { "Occupied voxels in their colours, seen from above and from a corner; what is high above the floor is left out." }
-            div.pictures.grid[one] {
-                div.moment { @for (place, method, map) in &maps { (view(method, *place, map, 0)) } }
-                div.moment { @for (place, method, map) in &maps { (view(method, *place, map, 1)) } }
+            p.about { "Occupied voxels in their colours, from above and from a corner; points high above the floor are left out." }
+            div.images.grid[one] {
+                div.snapshot { @for (index, method, map) in &maps { (view(method, *index, map, 0)) } }
+                div.snapshot { @for (index, method, map) in &maps { (view(method, *index, map, 1)) } }
             }
         }
     }
 }
 
-fn view(method: &MethodReport, place: usize, map: &DenseMap, which: usize) -> Markup {
+fn view(method: &MethodReport, index: usize, map: &DenseMap, which: usize) -> Markup {
     let (png, [width, height]) = &map.views[which];
-    let color = format!("color:var({})", Ink::method(method.name, place).variable());
+    let color = format!("color:var({})", Ink::method(method.name, index).variable());
     let from = ["from above", "from a corner"][which];
     html! {
         figure {

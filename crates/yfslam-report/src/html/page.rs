@@ -1,4 +1,4 @@
-//! In: a report. Out: its page. The template escapes every text that it is given.
+//! In: a report. Out: its page. The template escapes every text.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -6,7 +6,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::dense::dense;
 use super::tables;
-use crate::content::{MethodReport, Picture, Report};
+use crate::content::{MethodReport, Report, Snapshot};
 use crate::figures::axis::length;
 use crate::figures::bars::bars;
 use crate::figures::ink::{self, Ink};
@@ -15,7 +15,7 @@ use crate::figures::scene::{Captioned, Scene};
 use crate::figures::views::views;
 use yfslam_eval::{AlignmentKind, improvement_percent};
 
-/// The style sheet of all pages.
+/// Style sheet of all pages.
 const STYLE: &str = include_str!("style.css");
 
 impl Report<'_> {
@@ -33,7 +33,7 @@ fn page(report: &Report) -> Markup {
         (accuracy(report, &scene))
         (trajectory(&scene))
         (errors(report, &scene))
-        (pictures(report))
+        (snapshots(report))
         (dense(report))
         (times(report))
         (setup(report))
@@ -41,7 +41,7 @@ fn page(report: &Report) -> Markup {
     shell(report.sequence, report.version, &content)
 }
 
-/// What every page has around its content.
+/// Returns a page with this content.
 pub fn shell(title: &str, version: &str, content: &Markup) -> Markup {
     html! {
         (DOCTYPE)
@@ -68,7 +68,7 @@ fn header(report: &Report) -> Markup {
             h1 { (report.sequence) }
             p.verdict { (verdict(report)) }
             div.cards {
-                @for (place, method) in report.methods.iter().enumerate() { (card(method, place)) }
+                @for (index, method) in report.methods.iter().enumerate() { (card(method, index)) }
             }
             dl.facts {
                 @for (name, value) in &report.facts { div { dt { (name) } dd { (value) } } }
@@ -77,7 +77,7 @@ fn header(report: &Report) -> Markup {
     }
 }
 
-/// The last method in one sentence: it is the one that the report is about.
+/// Summarises the last method, which is the main subject of the report, in a sentence.
 fn verdict(report: &Report) -> Markup {
     let Some(method) = report.methods.last() else { return html! {} };
     let ate = method.evaluation.map(|e| e.ate.translation_m.rmse);
@@ -90,7 +90,7 @@ fn verdict(report: &Report) -> Markup {
         @if let Some((by, name)) = better {
             @if by >= 0.0 { ", " (format!("{by:.2}")) " % less than " (name) } @else { ", " (format!("{:.2}", -by)) " % more than " (name) }
         }
-        @if report.truth.is_none() { "; how far off is not known, for there is no ground truth" }
+        @if report.truth.is_none() { "; the error is not known, because there is no ground truth" }
         "."
         @if let Some(time) = &report.processor_time {
             span data-timing="" {
@@ -101,8 +101,8 @@ fn verdict(report: &Report) -> Markup {
     }
 }
 
-fn card(method: &MethodReport, place: usize) -> Markup {
-    let color = format!("--accent:var({})", Ink::method(method.name, place).variable());
+fn card(method: &MethodReport, index: usize) -> Markup {
+    let color = format!("--accent:var({})", Ink::method(method.name, index).variable());
     html! {
         div.card style=(color) {
             p.name { (method.name) }
@@ -124,7 +124,7 @@ fn percent(value: f64) -> String {
     if value >= 100.0 { "100 %".into() } else { format!("{value:.1} %") }
 }
 
-/// The scale of each method, where alignment was free to choose it.
+/// Describes the scale of each method after alignment by Sim(3).
 fn scales(report: &Report) -> String {
     let chosen = report.methods.iter().filter_map(|m| Some((m.name, m.evaluation?.ate.alignment)));
     let chosen: Vec<String> = chosen
@@ -147,20 +147,20 @@ fn accuracy(report: &Report, scene: &Scene) -> Markup {
             }
         };
     }
-    // A table of many methods needs the width of the page.
-    let beside = report.methods.len() <= 3;
+    // A table of many methods needs the whole width of the page.
+    let is_narrow = report.methods.len() <= 3;
     html! {
         section #accuracy {
             h2 { "Accuracy" }
             @for method in report.methods.iter().filter(|m| m.evaluation.is_none()) {
-                p.none { "The trajectory of " (method.name) " cannot be compared with the ground truth: too short, or too straight to be aligned." }
+                p.none { "The trajectory of " (method.name) " cannot be compared with the ground truth: it is too short, or too straight to be aligned." }
             }
             p.about {
                 "Absolute trajectory error (ATE) after alignment by rotation and translation" (scales(report))
-                "; relative pose error (RPE) without. S.D.: standard deviation."
+                ", and relative pose error (RPE) without alignment. S.D.: standard deviation."
                 @if report.methods.len() > 1 { " Improvement is (1 − error / error of the first) · 100 %." }
             }
-            div.pair.accuracy[beside].wide[!beside] {
+            div.pair.accuracy[is_narrow].wide[!is_narrow] {
                 (tables::errors(report))
                 @if let Some(bars) = bars(report, scene) { (figure(scene, &bars, false)) }
             }
@@ -170,16 +170,16 @@ fn accuracy(report: &Report, scene: &Scene) -> Markup {
 
 fn trajectory(scene: &Scene) -> Markup {
     let about = if scene.truth.is_some() {
-        "Estimates, aligned to the ground truth by rotation and translation, and the ground truth."
+        "Ground truth, and estimates aligned to it by rotation and translation."
     } else {
-        "The estimate, in the frame of the first camera pose."
+        "Estimates in the frame of the first camera pose."
     };
     html! {
         section #trajectory {
             h2 { "Trajectory" }
             p.about {
                 (about) " The dot is the start."
-                @if scene.any_lost() { " A cross is where tracking was lost; the faint line leads to where it was found again." }
+                @if scene.any_lost() { " A cross is where tracking was lost; the faint line leads to where it resumed." }
             }
             div.pair { @for view in views(scene) { (figure(scene, &view, true)) } }
         }
@@ -196,13 +196,13 @@ fn errors(report: &Report, scene: &Scene) -> Markup {
             h2 { "Error over time" }
             p.about {
                 "Distance between the aligned estimate and the ground truth, and angles between them about the camera's viewing direction \
-                 (roll), its right (pitch) and its down (yaw). Angles are those that are left when the orientations are aligned: positions \
-                 along a line would not tell how the camera is turned about it."
-                @if let Some(angle) = scene.mount.angle_deg() {
-                    " The ground truth follows a frame that is turned by " (format!("{angle:.1}")) "° against the camera's; this constant turn \
-                     is taken out here; the RPE in the table still has it."
+                 (roll), its right (pitch) and its down direction (yaw). For the angles, the orientations are aligned, because positions along a \
+                 line do not determine the rotation about it."
+                @if let Some(angle) = scene.body_rotation.angle_deg() {
+                    " The ground truth holds the poses of a body that is rotated by " (format!("{angle:.1}")) "° relative to the camera. This \
+                     constant rotation is removed here, but not in the RPE of the table."
                 }
-                @if scene.any_lost() { " Shaded: no pose." }
+                @if scene.any_lost() { " Shaded: lost." }
             }
             div.pair { @for one in &figures { (figure(scene, one, false)) } }
         }
@@ -229,8 +229,8 @@ fn key(name: &str, ink: Ink) -> Markup {
     html! { span { i style=(format!("background:var({})", ink.variable())) {} (name) } }
 }
 
-fn pictures(report: &Report) -> Markup {
-    let mut frames: Vec<usize> = report.methods.iter().flat_map(|m| &m.pictures).map(|p| p.frame).collect();
+fn snapshots(report: &Report) -> Markup {
+    let mut frames: Vec<usize> = report.methods.iter().flat_map(|m| &m.snapshots).map(|p| p.frame).collect();
     frames.sort_unstable();
     frames.dedup();
     if frames.is_empty() {
@@ -238,22 +238,22 @@ fn pictures(report: &Report) -> Markup {
     }
     let one = report.methods.len() == 1;
     html! {
-        section #pictures {
-            h2 { "What the filter saw" }
+        section #images {
+            h2 { "Decisions of the dynamic filter" }
             p.about {
                 span.legend {
                     span { i.ring {} "static feature, matched to the map" }
                     span { i.dim {} "static feature, not matched" }
                     span { i.dynamic {} "dynamic feature, not used" }
-                    span { i.box {} "box of a person" }
+                    span { i.box {} "bounding box of a person" }
                 }
             }
-            div.pictures.grid[one] {
+            div.images.grid[one] {
                 @for frame in frames {
-                    div.moment {
-                        @for (place, method) in report.methods.iter().enumerate() {
-                            @if let Some(picture) = method.pictures.iter().find(|p| p.frame == frame) {
-                                (moment(method, place, picture))
+                    div.snapshot {
+                        @for (index, method) in report.methods.iter().enumerate() {
+                            @if let Some(snapshot) = method.snapshots.iter().find(|p| p.frame == frame) {
+                                (show_snapshot(method, index, snapshot))
                             }
                         }
                     }
@@ -263,17 +263,17 @@ fn pictures(report: &Report) -> Markup {
     }
 }
 
-fn moment(method: &MethodReport, place: usize, picture: &Picture) -> Markup {
-    let [width, height] = picture.size;
-    let [used, dropped] = picture.features;
-    let color = format!("color:var({})", Ink::method(method.name, place).variable());
+fn show_snapshot(method: &MethodReport, index: usize, snapshot: &Snapshot) -> Markup {
+    let [width, height] = snapshot.size;
+    let [used, dropped] = snapshot.features;
+    let color = format!("color:var({})", Ink::method(method.name, index).variable());
     html! {
         figure {
-            img width=(width) height=(height) alt=(format!("frame {} under {}", picture.frame, method.name))
-                src=(format!("data:image/png;base64,{}", STANDARD.encode(&picture.png)));
+            img width=(width) height=(height) alt=(format!("frame {} under {}", snapshot.frame, method.name))
+                src=(format!("data:image/png;base64,{}", STANDARD.encode(&snapshot.png)));
             figcaption {
                 b style=(color) { (method.name) }
-                " frame " (picture.frame) @if !picture.note.is_empty() { ", " (picture.note) }
+                " frame " (snapshot.frame) @if !snapshot.note.is_empty() { ", " (snapshot.note) }
                 ": " (used) " features used, " (dropped) " dropped"
             }
         }
@@ -294,9 +294,9 @@ fn times(report: &Report) -> Markup {
                     tr { th {} th { "wall time of tracking (s)" } th { "frames per second" } }
                 }
                 tbody {
-                    @for (place, method) in report.methods.iter().enumerate() {
+                    @for (index, method) in report.methods.iter().enumerate() {
                         tr {
-                            th style=(format!("color:var({})", Ink::method(method.name, place).variable())) { (method.name) }
+                            th style=(format!("color:var({})", Ink::method(method.name, index).variable())) { (method.name) }
                             td { (format!("{:.2}", method.times.tracking_s)) }
                             td { (format!("{:.1}", method.frames.total as f64 / method.times.tracking_s.max(1e-9))) }
                         }
@@ -314,7 +314,7 @@ fn times(report: &Report) -> Markup {
 fn setup(report: &Report) -> Markup {
     html! {
         section #setup {
-            h2 { "Repeat it" }
+            h2 { "How to repeat it" }
             pre.command { (report.command) }
             @for method in &report.methods {
                 details {

@@ -1,4 +1,4 @@
-//! In: errors and times of all methods. Out: their tables; a method a column, so that they fit narrow pages too.
+//! In: errors and times of all methods. Out: their tables, with one column for each method.
 
 use maud::{Markup, html};
 
@@ -6,17 +6,17 @@ use crate::content::{MethodReport, ProcessorTime, Report, Stage};
 use crate::figures::ink::Ink;
 use yfslam_eval::{Delta, Evaluation, Rpe, Statistics, improvement_percent};
 
-/// Finds a figure among the errors of a method.
+/// Returns a figure of the errors of a method.
 type Find = Box<dyn Fn(&Evaluation) -> Option<f64>>;
 
-/// A row of the table of errors: its name, the name of the figure in `run.json`, and where it is found.
+/// A row of the table of errors: name, name of the figure in `run.json`, and how to get it.
 struct Row {
     name: String,
     key: String,
     of: Find,
 }
 
-/// Errors and improvement (paper Tables 2 to 4, equation 3); a single method leaves room for absolute and relative errors side by side.
+/// Returns errors and improvement (paper Tables 2 to 4, equation 3); with a single method, absolute and relative errors are side by side.
 pub fn errors(report: &Report) -> Markup {
     let rows = rows(report);
     let absolute = rows.iter().filter(|row| row.key.starts_with("ate")).count();
@@ -42,8 +42,8 @@ fn table(report: &Report, rows: &[Row], with_tracked: bool) -> Markup {
                     }
                     tr {
                         th {}
-                        @for (place, method) in report.methods.iter().enumerate() { (method_heading(method, place)) }
-                        @for (place, method) in others.iter().enumerate() { (method_heading(method, place + 1)) }
+                        @for (index, method) in report.methods.iter().enumerate() { (method_heading(method, index)) }
+                        @for (index, method) in others.iter().enumerate() { (method_heading(method, index + 1)) }
                     }
                 }
                 tbody {
@@ -75,9 +75,9 @@ fn table(report: &Report, rows: &[Row], with_tracked: bool) -> Markup {
     }
 }
 
-/// A column's head in the colour of its method.
-fn method_heading(method: &MethodReport, place: usize) -> Markup {
-    html! { th style=(format!("color:var({})", Ink::method(method.name, place).variable())) { (method.name) } }
+/// Returns the heading of a column in the colour of its method.
+fn method_heading(method: &MethodReport, index: usize) -> Markup {
+    html! { th style=(format!("color:var({})", Ink::method(method.name, index).variable())) { (method.name) } }
 }
 
 fn improvement(baseline: Option<&MethodReport>, method: &MethodReport, row: &Row) -> Markup {
@@ -133,7 +133,7 @@ fn rows(report: &Report) -> Vec<Row> {
     rows
 }
 
-/// Times of the stages, with bars (paper Table 5).
+/// Returns the times of the stages with bars (paper Table 5).
 pub fn times(report: &Report) -> Markup {
     let stages = stage_names(report);
     let found = |method: &MethodReport, name: &str| method.times.stages.iter().find(|s| s.name == name).cloned();
@@ -147,12 +147,12 @@ pub fn times(report: &Report) -> Markup {
                 }
                 @for name in &stages {
                     tbody {
-                        @for (place, method) in report.methods.iter().enumerate() {
+                        @for (index, method) in report.methods.iter().enumerate() {
                             @if let Some(stage) = found(method, name) {
                                 tr {
-                                    th { @if place == 0 { (name) } }
-                                    (method_heading(method, place))
-                                    (stage_cells(&stage, longest_ms, Ink::method(method.name, place)))
+                                    th { @if index == 0 { (name) } }
+                                    (method_heading(method, index))
+                                    (stage_cells(&stage, longest_ms, Ink::method(method.name, index)))
                                 }
                             }
                         }
@@ -170,7 +170,7 @@ pub fn times(report: &Report) -> Markup {
     }
 }
 
-/// Processor time of a frame and what it consists of.
+/// Returns the processor time of a frame and its parts.
 pub fn processor_time(time: &ProcessorTime) -> Markup {
     html! {
         table.figures.totals {
@@ -186,7 +186,7 @@ pub fn processor_time(time: &ProcessorTime) -> Markup {
     }
 }
 
-/// Stages of all methods, in the order in which they come up.
+/// Returns the stages of all methods in their order.
 fn stage_names<'a>(report: &'a Report) -> Vec<&'a str> {
     let mut names: Vec<&'a str> = Vec::new();
     for stage in report.methods.iter().flat_map(|m| &m.times.stages) {

@@ -1,4 +1,4 @@
-//! In: tables with their titles. Out: one HTML page of them that needs nothing but itself, in the style of a run's report.
+//! In: tables with their titles. Out: one HTML page in the style of the report of a run.
 
 use maud::{Markup, html};
 
@@ -6,25 +6,25 @@ use super::page::shell;
 use crate::figures::ink::Ink;
 use crate::table::Table;
 
-/// Word with which the last cell of a row begins whose figures were taken from a paper.
+/// First word of the last cell in a row of figures from a paper.
 pub const PUBLISHED: &str = "published";
-/// Header of the column that says where figures come from.
+/// Header of the column with the origin of the figures.
 pub const ORIGIN: &str = "figures";
-/// Header that begins the name of a column of improvements.
+/// First word of the header of a column of improvements.
 pub const IMPROVEMENT: &str = "improvement";
 
 /// Tables on a page.
 #[derive(Clone, Debug)]
 pub struct TablesPage<'a> {
-    /// What all of it is about.
+    /// Title of the page.
     pub title: &'a str,
-    /// What there is to know of it, as name and value.
+    /// Facts, as name and value.
     pub facts: Vec<(&'a str, String)>,
     /// The tables, in order.
     pub sections: &'a [TableSection],
     /// Version of the program.
     pub version: &'a str,
-    /// The command that gives this page again.
+    /// Command that produces this page again.
     pub command: String,
 }
 
@@ -35,14 +35,14 @@ pub struct TableSection {
     pub id: &'static str,
     /// The heading.
     pub title: String,
-    /// What the figures are, in a sentence or two.
+    /// Explanation of the figures.
     pub about: String,
-    /// Its rows; a row that ends in a cell with [`PUBLISHED`] stands back.
+    /// The table; rows whose last cell begins with [`PUBLISHED`] are less prominent.
     pub table: Table,
 }
 
 impl TablesPage<'_> {
-    /// The page.
+    /// Returns the page.
     pub fn html(&self) -> String {
         let content = html! {
             header {
@@ -53,7 +53,7 @@ impl TablesPage<'_> {
                 }
             }
             @for section in self.sections { (show(section)) }
-            section #setup { h2 { "Repeat it" } pre.command { (self.command) } }
+            section #setup { h2 { "How to repeat it" } pre.command { (self.command) } }
         };
         shell(self.title, self.version, &content).into_string()
     }
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_page_escapes_its_texts_and_tells_published_rows_from_measured_ones() {
+    fn a_page_escapes_texts_and_marks_published_rows() {
         let mut table = Table::new(["sequence", "system", "RMSE", "improvement of RMSE (%)", "figures"]);
         table.push(["a<b", "none", "0.5", "", "measured"]);
         table.push(["a<b", "yf", "0.6", "-20.00", "measured"]);
@@ -120,6 +120,6 @@ mod tests {
         assert!(html.contains("x &amp; y") && html.contains("a&lt;b") && !html.contains("a<b"));
         assert_eq!(html.matches("<tr class=\"published\"").count(), 1, "{html}");
         assert!(html.contains("<td class=\"improve worse\">−20.00</td>"), "{html}");
-        assert!(!html.contains("src=") && !html.contains("http"), "it needs nothing but itself");
+        assert!(!html.contains("src=") && !html.contains("http"), "the page loads nothing");
     }
 }

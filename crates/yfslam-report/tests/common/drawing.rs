@@ -1,4 +1,4 @@
-//! Reads the figures of a page back, as a reader does: what a stroke is worth is told by the labels on the axes alone.
+//! Reads values from the figures of a page with the help of the labels on the axes.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ pub struct Label {
     pub text: String,
 }
 
-/// A filled rectangle: its colour, left and right, top and bottom.
+/// A filled rectangle: colour, left and right, top and bottom.
 #[derive(Clone, Debug)]
 pub struct Bar {
     pub fill: String,
@@ -22,7 +22,7 @@ pub struct Bar {
     pub y: [f64; 2],
 }
 
-/// What a figure holds, in its own units.
+/// The elements of a figure, in its own units.
 #[derive(Clone, Debug, Default)]
 pub struct Drawing {
     pub labels: Vec<Label>,
@@ -31,7 +31,7 @@ pub struct Drawing {
     pub lines: Vec<(String, Vec<[f64; 2]>)>,
 }
 
-/// Where values lie along an axis.
+/// Positions of values along an axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
     start: f64,
@@ -40,7 +40,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// From labelled places, all of which must agree.
+    /// Computes the scale from labels, all of which must agree.
     fn of(ticks: &[(f64, f64)], is_log: bool) -> Self {
         let ticks: Vec<(f64, f64)> = ticks.iter().map(|&(at, v)| (at, if is_log { v.log10() } else { v })).collect();
         let (first, last) = (ticks[0], ticks[ticks.len() - 1]);
@@ -52,12 +52,12 @@ impl Scale {
         Self { start: first.0 - per_unit * first.1, per_unit, is_log }
     }
 
-    /// Where a value belongs.
+    /// Returns the position of a value.
     pub fn place(&self, value: f64) -> f64 {
         self.start + self.per_unit * if self.is_log { value.log10() } else { value }
     }
 
-    /// The value at a place.
+    /// Returns the value at a position.
     pub fn value(&self, place: f64) -> f64 {
         let value = (place - self.start) / self.per_unit;
         if self.is_log { 10f64.powf(value) } else { value }
@@ -65,28 +65,28 @@ impl Scale {
 }
 
 impl Drawing {
-    /// The upright axis, in metres or degrees.
+    /// Returns the vertical axis, in metres or degrees.
     pub fn y(&self) -> Scale {
         let title = &self.labels[0].text;
         let ticks = self.labels.iter().filter(|l| l.anchor == "end");
         Scale::of(&ticks.map(|l| (l.y, value(&l.text, title))).collect::<Vec<_>>(), title.contains("logarithmic"))
     }
 
-    /// The level axis.
+    /// Returns the horizontal axis.
     pub fn x(&self) -> Scale {
         let title = &self.labels[1].text;
         let ticks = self.labels[2..].iter().filter(|l| l.anchor == "middle");
         Scale::of(&ticks.map(|l| (l.x, value(&l.text, title))).collect::<Vec<_>>(), false)
     }
 
-    /// The longest line of a colour.
+    /// Returns the longest line of a colour.
     pub fn line(&self, color: &str) -> &[[f64; 2]] {
         let lines = self.lines.iter().filter(|(stroke, _)| stroke == color);
         &lines.max_by_key(|(_, points)| points.len()).unwrap().1
     }
 }
 
-/// A label such as `−0.5` or `20 cm` in metres or degrees; the unit may be in the axis' title instead.
+/// Returns the value of a label such as `−0.5` or `20 cm` in metres or degrees; the unit may be in the title of the axis.
 fn value(label: &str, title: &str) -> f64 {
     let (number, unit) = label.split_once(' ').unwrap_or((label, ""));
     let factor = |unit: &str| match unit {
@@ -99,7 +99,7 @@ fn value(label: &str, title: &str) -> f64 {
     number.replace('−', "-").parse::<f64>().unwrap() * factor(unit) * factor(in_title)
 }
 
-/// All figures of a page by the start of their descriptions.
+/// Returns all figures of a page by the start of their descriptions.
 pub fn drawings(html: &str) -> BTreeMap<String, Drawing> {
     let mut found = BTreeMap::new();
     let mut reader = Reader::from_str(html);
@@ -163,7 +163,7 @@ fn attributes(tag: &BytesStart) -> BTreeMap<String, String> {
     tag.attributes().map(|a| a.unwrap()).map(|a| (a.key.as_ref().to_owned(), a.value.to_string())).collect()
 }
 
-/// The colour in which the heading of the table has a method, as figures write it.
+/// Returns the colour of a method in the heading of the table, as in the figures.
 pub fn color(html: &str, method: &str) -> String {
     let (before, _) = html.split_once(&format!(")\">{method}</th>")).unwrap();
     let (_, variable) = before.rsplit_once("color:var(").unwrap();

@@ -3,11 +3,11 @@
 
 use nalgebra::{Isometry3, Vector3};
 use yfslam_eval::{Evaluation, StampedPose};
-use yfslam_report::{Frames, MethodReport, Picture, Report, Stage, Times};
+use yfslam_report::{Frames, MethodReport, Report, Snapshot, Stage, Times};
 
 pub const FRAME_NS: i64 = 33_333_333;
 
-/// A camera that goes in circles, z up, looking ahead; `off_m` and `off_deg` are what is wrong at a time in s.
+/// Returns the trajectory of a camera that moves in circles, z up, looking forward; `off_m` and `off_deg` are errors at a time in s.
 pub fn circles(frames: i64, off_m: impl Fn(f64) -> f64, off_deg: impl Fn(f64) -> f64) -> Vec<StampedPose> {
     let pose = |i: i64| {
         let t = i as f64 * FRAME_NS as f64 / 1e9;
@@ -32,7 +32,7 @@ pub fn method<'a>(
     let stage = |name: &str, ms: f64| Stage { name: name.into(), count: 9, median_ms: ms, p99_ms: 3.0 * ms };
     let times = Times { stages: vec![stage("features", 1.5), stage("mapping", 12.0)], tracking_s: 2.5 };
     let frames = Frames { total: trajectory.len() + 90, tracked: trajectory.len(), lost: 90, skipped: Vec::new() };
-    let picture = Picture { frame: 3, note: "", png: vec![0; 9], size: [4, 3], features: [8, 1] };
+    let snapshot = Snapshot { frame: 3, note: "", png: vec![0; 9], size: [4, 3], features: [8, 1] };
     let config = "seed = 0 # <&>\n".into();
     MethodReport {
         name,
@@ -41,7 +41,7 @@ pub fn method<'a>(
         evaluation,
         frames,
         times,
-        pictures: vec![picture],
+        snapshots: vec![snapshot],
         dense: None,
         config,
     }
