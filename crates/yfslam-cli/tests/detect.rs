@@ -134,7 +134,7 @@ fn an_image_that_cannot_be_read_is_reported_and_the_others_are_processed() {
     write_color_png(&root.join("images/good.png"), &RgbImage::new(40, 30)).unwrap();
     let bytes = fs::read(root.join("images/good.png")).unwrap();
     fs::write(root.join("images/cut.png"), &bytes[..bytes.len() / 2]).unwrap();
-    fs::write(root.join("images/notes.txt"), "not looked at").unwrap();
+    fs::write(root.join("images/notes.txt"), "not an image").unwrap();
     fs::write(root.join("photo.jpg"), "RIFF....WEBP").unwrap();
     let output = yfslam(root, &["detect", "images", "photo.jpg", "--out", "out"]);
     assert!(!output.success);
@@ -153,10 +153,10 @@ fn unusable_arguments_are_refused_before_the_first_image() {
     fs::create_dir_all(root.join("seq/rgb")).unwrap();
     fs::create_dir(root.join("empty")).unwrap();
     write_color_png(&root.join("a.png"), &RgbImage::new(40, 30)).unwrap();
-    fails(root, &["detect", "a.png", "nowhere.png"], &["there is no nowhere.png", "check the path"]);
+    fails(root, &["detect", "a.png", "nowhere.png"], &["nowhere.png does not exist", "check the path"]);
     fails(root, &["detect", "empty"], &["empty holds no images", ".png, .jpg or .jpeg"]);
     fails(root, &["detect", "seq"], &["did you mean seq/rgb?"]);
-    fails(root, &["detect", "a.png", "--class", "unicorn"], &["'unicorn'", "it knows: person"]);
+    fails(root, &["detect", "a.png", "--class", "unicorn"], &["'unicorn'", "its classes are: person"]);
     fails(root, &["detect", "a.png", "--score", "1.5"], &["score_threshold = 1.5", "between 0 and 1"]);
     fails(root, &["detect", "a.png", "--score", "-1"], &["score_threshold = -1"]);
     fails(root, &["detect", "a.png", "--detector", "nowhere.onnx"], &["nowhere.onnx", "check the path"]);

@@ -46,25 +46,25 @@ fn the_products_of_a_run_agree_with_each_other_and_are_the_same_on_every_run() {
     let make = |out: &str| {
         let saved = format!("{out}.map");
         succeeds(folder.path(), &["run", WORLD, "--dense", "--save-map", &saved, "--out", out, "-q"]);
-        let said = succeeds(folder.path(), &["map", out]).stdout;
-        (folder.path().join(out), said)
+        let printed = succeeds(folder.path(), &["map", out]).stdout;
+        (folder.path().join(out), printed)
     };
-    let (first, said) = make("first");
+    let (first, printed) = make("first");
     let map = first.join("map");
-    let points = number(&said, "cloud: ");
-    assert!(points > 1000, "{said}");
+    let points = number(&printed, "cloud: ");
+    assert!(points > 1000, "{printed}");
     assert_eq!(number(&head(&map.join("cloud.ply")), "element vertex "), points);
     let pcd = fs::read(map.join("cloud.pcd")).unwrap();
     assert_eq!(number(&head(&map.join("cloud.pcd")), "POINTS "), points);
     assert_eq!(pcd.len() - (pcd.windows(12).position(|w| w == b"DATA binary\n").unwrap() + 12), 16 * points);
-    assert_eq!(number(&head(&map.join("octomap.bt")), "size "), number(&said, "octomap: "));
+    assert_eq!(number(&head(&map.join("octomap.bt")), "size "), number(&printed, "octomap: "));
     let mesh = head(&map.join("mesh.ply"));
-    assert_eq!(number(&mesh, "element vertex "), number(&said, "mesh: "));
+    assert_eq!(number(&mesh, "element vertex "), number(&printed, "mesh: "));
     let triangles = number(&mesh, "element face ");
     assert!(triangles > 1000, "{triangles}");
     let (grid, yaml) = (fs::read(map.join("grid.pgm")).unwrap(), head(&map.join("grid.yaml")));
-    let (width, height) = (number(&said, "grid: "), number(&said, " × "));
-    assert!(grid.starts_with(format!("P5\n{width} {height}\n255\n").as_bytes()), "{said}");
+    let (width, height) = (number(&printed, "grid: "), number(&printed, " × "));
+    assert!(grid.starts_with(format!("P5\n{width} {height}\n255\n").as_bytes()), "{printed}");
     assert!(yaml.contains("image: grid.pgm\n") && yaml.contains("resolution: 0.05\n"), "{yaml}");
     assert!([0, 205, 254].iter().all(|shade| grid[15..].contains(shade)), "occupied, unknown and free");
 
@@ -166,8 +166,8 @@ fn the_map_of_two_sessions_shows_what_both_have_observed() {
         println!("{} of {} voxels; {kept:.3} of them are in the map of both", part.len(), voxels.len());
         assert!(kept > 0.9 && more > 1.2, "{kept} of a part are in the map of both, which is {more} times as large");
     }
-    let said = succeeds(folder.path(), &["map", "both.map", "--cloud", "--out", "cloud"]).stdout;
-    assert!(number(&said, "cloud: ") * 10 > voxels.len() * 9, "{said}");
+    let printed = succeeds(folder.path(), &["map", "both.map", "--cloud", "--out", "cloud"]).stdout;
+    assert!(number(&printed, "cloud: ") * 10 > voxels.len() * 9, "{printed}");
     // Localisation changes nothing.
     succeeds(folder.path(), &[&again[..], &["--localise", "--out", "third"]].concat());
     assert_eq!(decode(&read("first.map")).unwrap(), before);

@@ -1,4 +1,4 @@
-//! Instance segmentation: one object is told from another, also of the same class.
+//! Instance segmentation: objects of the same class are kept apart.
 //!
 //! In: a network. Out: a detector whose mask shows instances.
 

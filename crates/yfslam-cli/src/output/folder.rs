@@ -12,7 +12,7 @@ use crate::run::pipeline::Outcome;
 
 /// Parent of the output folders of runs without `--out`.
 const DEFAULT_PARENT: &str = "yfslam-out";
-/// The file that says why one method of several has no result.
+/// File with the reason why one method of several has no result.
 pub const FAILURE_FILE: &str = "failure.txt";
 
 /// A folder that can be written to.

@@ -85,7 +85,7 @@ fn stages(stages: &Stages) -> Vec<Stage> {
     stages.summaries().map(stage).collect()
 }
 
-/// What there is to know about the sequence, as name and value.
+/// Returns facts about the sequence, as name and value.
 fn facts(run: &ReportedRun, boxes: &BoxOrigin) -> Vec<(&'static str, String)> {
     let (camera, stamps) = (&run.source.camera, &run.source.stamps_ns);
     let seconds = match (stamps.first(), stamps.last()) {

@@ -44,7 +44,7 @@ pub fn fails(folder: &Path, args: &[&str], words: &[&str]) {
     let output = yfslam(folder, args);
     assert!(!output.success, "{args:?} succeeded: {}", output.stdout);
     for word in words {
-        assert!(output.stderr.contains(word), "{args:?} does not say '{word}': {}", output.stderr);
+        assert!(output.stderr.contains(word), "{args:?} does not contain '{word}': {}", output.stderr);
     }
 }
 

@@ -76,7 +76,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     })
 }
 
-/// Names the threads that render, so that their processor time can be told from that of other threads.
+/// Names the threads that render, so that their processor time can be measured apart from that of other threads.
 fn name_render_threads() {
     // Fails only if the threads exist already, and then they stay as they are.
     let _ = rayon::ThreadPoolBuilder::new().thread_name(|index| format!("yfslam-render-{index}")).build_global();
