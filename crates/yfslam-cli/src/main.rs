@@ -1,43 +1,27 @@
 //! The command `yfslam`.
 //!
 //! ```text
-//! arguments ─cli─► command/* ─► source (folder, world) ─► boxes ─► lane, one a method (pipeline: Slam, tallies) ─► output (files)
+//! command ─► output ─► run ─► input ─► ui ─► stats        (and draw, which uses none of the others)
 //! ```
+//!
+//! An arrow points from a folder to the folders that it may use; `tests/structure.rs` checks it.
 
-mod accuracy;
-mod apart;
-mod bench;
-mod boxes;
-mod class_legend;
-mod cli;
 mod command;
-mod cpu;
-mod dense;
-mod dense_picture;
-mod detector;
 mod draw;
-mod found;
-mod html;
-mod lane;
-mod map;
-mod moments;
+mod input;
 mod output;
-mod overlay;
-mod pipeline;
-mod progress;
-mod report;
-mod runs;
-mod settings;
-mod source;
-mod summary;
-mod terminal;
+mod run;
+mod stats;
+mod ui;
 
 use std::process::ExitCode;
 
 use clap::Parser;
 
+use ui::terminal;
+
 fn main() -> ExitCode {
-    let cli = cli::Cli::parse();
+    let cli = command::cli::Cli::parse();
     match command::run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if terminal::is_closed_pipe(&error) => ExitCode::SUCCESS,

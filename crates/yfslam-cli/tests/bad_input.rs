@@ -1,4 +1,4 @@
-//! What can be wrong with the input: an error that names file, value and cure, or a counted skip where a robot would go on.
+//! Faulty input: an error with file, value and what to do, or a skipped frame that is counted.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -17,7 +17,7 @@ fn recording() -> TempDir {
     folder
 }
 
-/// Runs a recording of which one frame is broken: the others are tracked, the broken one is counted and named.
+/// Runs a recording with one faulty frame: the others are tracked, the faulty one is counted and named.
 #[track_caller]
 fn assert_skipped(folder: &TempDir, reason: &str, file: &str) {
     let output = succeeds(folder.path(), &["run", "seq", "--method", "none", "--out", "out"]);
@@ -42,7 +42,7 @@ fn truncate(path: &Path) {
 const RUN: [&str; 4] = ["run", "seq", "--method", "none"];
 
 #[test]
-fn a_missing_an_empty_and_a_wrong_folder_are_told_apart() {
+fn a_missing_an_empty_and_a_wrong_folder_give_different_errors() {
     let folder = recording();
     fs::create_dir(folder.path().join("empty")).unwrap();
     let run = |sequence, words: &[&str]| fails(folder.path(), &["run", sequence, "--method", "none"], words);
@@ -95,7 +95,7 @@ fn depth_of_another_size_is_a_skip_and_all_of_another_size_is_an_error() {
 }
 
 #[test]
-fn depth_without_any_measurement_is_a_skip_and_nothing_but_that_is_an_error() {
+fn depth_without_any_measurement_is_a_skip_and_an_error_if_all_frames_are_such() {
     let folder = recording();
     let blind = |path: &Path| write_depth_png(path, &Image::new(320, 240)).unwrap();
     blind(&folder.path().join("seq/depth/7.png"));
@@ -105,7 +105,7 @@ fn depth_without_any_measurement_is_a_skip_and_nothing_but_that_is_an_error() {
 }
 
 #[test]
-fn a_sensor_that_wakes_up_late_costs_its_blind_frames_alone() {
+fn unusable_frames_at_the_start_are_skipped() {
     let folder = recording();
     write_depth_png(&folder.path().join("seq/depth/blind.png"), &Image::new(320, 240)).unwrap();
     for (kind, file) in [("rgb", "rgb/0.png"), ("depth", "depth/blind.png")] {
@@ -119,7 +119,7 @@ fn a_sensor_that_wakes_up_late_costs_its_blind_frames_alone() {
 }
 
 #[test]
-fn frames_without_features_give_no_trajectory_and_the_error_says_what_was_missing() {
+fn frames_without_features_give_an_error_with_the_reason() {
     let folder = recording();
     for_each_frame(&folder, "rgb", |path| write_color_png(path, &Image::new(320, 240)).unwrap());
     fails(
@@ -157,14 +157,14 @@ fn repeated_and_backward_stamps_are_counted_skips_and_an_unsorted_list_is_an_err
 }
 
 #[test]
-fn images_that_are_never_taken_together_are_an_error_that_names_the_stamps() {
+fn images_without_common_time_stamps_are_an_error_with_these_stamps() {
     let folder = recording();
     edit_lines(&folder.path().join("seq/depth.txt"), |_, line| Some(format!("77{line}")));
     fails(folder.path(), &RUN, &["no colour image has a depth image within 20.0 ms", "770.0", "same clock"]);
 }
 
 #[test]
-fn a_depth_factor_that_cannot_be_is_refused_with_one_that_can() {
+fn an_implausible_depth_factor_is_refused_with_a_plausible_one() {
     let folder = recording();
     let run = |factor, words: &[&str]| fails(folder.path(), &[&RUN[..], &["--depth-factor", factor]].concat(), words);
     run("1", &["depth factor 1 ", "--depth-factor 5000"]);
@@ -173,7 +173,7 @@ fn a_depth_factor_that_cannot_be_is_refused_with_one_that_can() {
 }
 
 #[test]
-fn a_camera_that_is_not_there_is_an_error_with_the_presets() {
+fn an_unknown_or_missing_camera_is_an_error_with_the_presets() {
     let folder = recording();
     fails(folder.path(), &[&RUN[..], &["--camera", "tum9"]].concat(), &["tum9", "tum1, tum2, tum3, bonn"]);
     fs::remove_file(folder.path().join("seq/camera.toml")).unwrap();
@@ -182,7 +182,7 @@ fn a_camera_that_is_not_there_is_an_error_with_the_presets() {
 }
 
 #[test]
-fn ground_truth_with_nan_is_an_error_where_it_was_asked_for_and_a_warning_where_it_merely_lies_there() {
+fn faulty_ground_truth_is_an_error_if_it_is_requested_and_a_warning_if_it_is_found_in_the_folder() {
     let folder = recording();
     let truth = folder.path().join("seq/groundtruth.txt");
     edit_lines(&truth, |i, line| Some(if i == 2 { "0.066666667 nan 0 0 0 0 0 1".into() } else { line.to_owned() }));
@@ -202,13 +202,13 @@ fn ground_truth_of_another_recording_fails_the_run_but_not_its_trajectory() {
 }
 
 #[test]
-fn an_unreadable_or_foreign_network_is_refused() {
+fn an_unreadable_or_unsupported_network_is_refused() {
     let folder = recording();
     fs::write(folder.path().join("text.onnx"), "This is not a network.").unwrap();
     let run = |file, words: &[&str]| fails(folder.path(), &["run", "seq", "--detector", file], words);
     run("nowhere.onnx", &["nowhere.onnx", "check the path"]);
     run("text.onnx", &["text.onnx", "not a readable ONNX model", "export it again"]);
-    // A class that the network in this program does not know, with its own thread and with one for several methods.
+    // A class that the network does not have, with one method and with several.
     fs::write(folder.path().join("c.toml"), "[dynamic]\nmovable = [\"unicorn\"]\n").unwrap();
     for method in ["yf", "boxes,yf"] {
         let args = ["run", "seq", "--config", "c.toml", "--method", method];
@@ -236,7 +236,7 @@ fn an_unknown_key_or_a_bad_value_in_the_configuration_is_named() {
 }
 
 #[test]
-fn an_output_folder_that_cannot_be_written_is_found_out_before_the_run() {
+fn an_output_folder_that_cannot_be_written_is_reported_before_the_run() {
     let folder = recording();
     fs::write(folder.path().join("file"), "").unwrap();
     fails(folder.path(), &[&RUN[..], &["--out", "file/out"]].concat(), &["file/out", "choose another folder"]);
@@ -244,11 +244,11 @@ fn an_output_folder_that_cannot_be_written_is_found_out_before_the_run() {
 }
 
 #[test]
-fn a_sensor_that_the_sequence_does_not_have_is_refused_and_mono_leaves_depth_unused() {
+fn a_sensor_that_the_sequence_does_not_have_is_refused_and_mono_ignores_depth() {
     let folder = recording();
     for sequence in ["seq", SMALL_WORLD] {
         fails(folder.path(), &["run", sequence, "--sensor", "stereo"], &["no right images", "--sensor", "mono"]);
         fails(folder.path(), &["run", sequence, "--sensor", "mono", "--dense"], &["--dense needs depth images"]);
     }
-    fails(folder.path(), &["run", "seq", "--sensor", "mono", "--method", "none"], &["no map could be begun"]);
+    fails(folder.path(), &["run", "seq", "--sensor", "mono", "--method", "none"], &["no map could be initialised"]);
 }

@@ -1,4 +1,4 @@
-//! `yfslam bench`: cells are run once, tables hold them all.
+//! `yfslam bench`: each cell is run once, and the tables have all cells.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -12,7 +12,7 @@ use common::{fails, record, succeeds};
 /// A world without people: quick to render, and every method tracks it.
 const EMPTY: &str = "walking_xyz?people=0&width=320&height=240";
 
-/// The cells, sorted, and when they were written.
+/// Returns the cells, sorted, and when they were written.
 fn cells(root: &Path) -> Vec<(PathBuf, SystemTime)> {
     let mut cells: Vec<_> = fs::read_dir(root.join("b/cells")).unwrap().map(|e| e.unwrap().path()).collect();
     cells.sort();
@@ -20,7 +20,7 @@ fn cells(root: &Path) -> Vec<(PathBuf, SystemTime)> {
 }
 
 #[test]
-fn a_bench_goes_on_where_it_stopped_and_tells_worlds_and_folders_alike() {
+fn a_bench_continues_where_it_stopped_with_worlds_and_folders() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     record(&root.join("seq"));
@@ -40,7 +40,7 @@ fn a_bench_goes_on_where_it_stopped_and_tells_worlds_and_folders_alike() {
     assert!(!page.contains("published: ") && !ate.contains("published: "), "nothing was published about these");
     let before = cells(root);
     assert_eq!(before.len(), 8);
-    // One method is missing, both methods of another are, one of them cut in half: they are run again, the others are not.
+    // One method of a group is missing, and both of another, one of them truncated: only these are run again.
     fs::remove_file(&before[0].0).unwrap();
     fs::remove_file(&before[2].0).unwrap();
     fs::write(&before[3].0, "{\"seq").unwrap();
@@ -54,21 +54,21 @@ fn a_bench_goes_on_where_it_stopped_and_tells_worlds_and_folders_alike() {
     let more = cells(root);
     assert_eq!(more.len(), 12);
     assert!(after.iter().all(|cell| more.contains(cell)));
-    // Other options, other figures.
+    // Other options give other results.
     succeeds(root, &[&args[..], &["--", "--start", "2"]].concat());
     assert!(cells(root).iter().filter(|cell| more.contains(cell)).count() == 4);
 }
 
 #[test]
-fn a_method_that_fails_is_a_cell_that_says_so_and_the_others_have_their_figures() {
+fn the_failure_of_a_method_is_stored_in_its_cell_and_the_others_have_results() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     let args = ["bench", EMPTY, "--methods", "none,yf", "--seeds", "1", "--frames", "8", "--out", "b"];
     let output = succeeds(root, &[&args[..], &["--", "--fault", "black@0+9"]].concat());
-    assert!(output.stderr.contains("no map could be begun"), "{}", output.stderr);
+    assert!(output.stderr.contains("no map could be initialised"), "{}", output.stderr);
     let csv = fs::read_to_string(root.join("b/cells.csv")).unwrap();
-    assert_eq!(csv.matches("no map could be begun").count(), 2, "{csv}");
-    // A file where the pictures of one method should go.
+    assert_eq!(csv.matches("no map could be initialised").count(), 2, "{csv}");
+    // A file in place of the folder for the images of one method.
     let run = fs::read_dir(root.join("b/runs")).unwrap().next().unwrap().unwrap().path();
     fs::write(run.join("none/overlay"), "").unwrap();
     succeeds(root, &[&args[..], &["--", "--overlay"]].concat());
@@ -76,14 +76,14 @@ fn a_method_that_fails_is_a_cell_that_says_so_and_the_others_have_their_figures(
     let line = |method: &str| csv.lines().find(|line| line.contains(&format!(",{method},1,"))).unwrap();
     assert!(line("none").contains(",none,1,,,,,,,,,,\"") && line("none").contains("overlay"), "{csv}");
     assert!(line("yf").contains(",yf,1,0.") && line("yf").ends_with(','), "{csv}");
-    // A run that does not begin.
+    // A run that cannot start.
     let output = succeeds(root, &[&args[..], &["--", "--depth-factor", "5"]].concat());
     assert!(output.stderr.contains("leave out --depth-factor"), "{}", output.stderr);
-    fails(root, &["bench", "nowhere"], &["nowhere is no folder", "walking_xyz"]);
+    fails(root, &["bench", "nowhere"], &["nowhere is not a folder", "walking_xyz"]);
 }
 
 #[test]
-fn a_folder_of_sequences_is_run_and_known_names_stand_beside_what_was_published() {
+fn a_folder_of_sequences_is_run_and_published_results_are_added_to_benchmark_sequences() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     for name in ["rgbd_bonn_crowd", "other"] {
@@ -96,7 +96,7 @@ fn a_folder_of_sequences_is_run_and_known_names_stand_beside_what_was_published(
     assert!(rows.contains("\nother,none,") && rows.contains("\nrgbd_bonn_crowd,none,"), "{rows}");
     let quoted: Vec<&str> = rows.lines().filter(|line| line.contains("published: ")).collect();
     assert!(quoted.len() == 4 && quoted.iter().all(|line| line.starts_with("rgbd_bonn_crowd,")), "{rows}");
-    // A part of it is something else.
+    // Published results are not added to a part of a sequence.
     let known = ["bench", "--known", "data", "--methods", "none", "--seeds", "1"];
     let output = succeeds(root, &[&known[..], &["--frames", "8", "--out", "part"]].concat());
     assert!(!table("part").contains("published: ") && !table("part").contains("other"), "{}", table("part"));
@@ -104,6 +104,6 @@ fn a_folder_of_sequences_is_run_and_known_names_stand_beside_what_was_published(
         assert!(output.stderr.contains(words), "no '{words}' in {}", output.stderr);
     }
     assert!(fs::read_to_string(root.join("part/table.md")).unwrap().contains("rgbd_bonn_crowd2"));
-    fails(root, &["bench", "--known", "data/other"], &["none of the known", "walking_xyz"]);
+    fails(root, &["bench", "--known", "data/other"], &["none of the benchmark", "walking_xyz"]);
     fails(root, &["bench", "data/other/rgb"], &["lists of images"]);
 }

@@ -1,4 +1,4 @@
-//! Classes in dense maps: things that a detector finds are named where they stand, and nothing else is.
+//! Classes in dense maps: detected objects have their class, and nothing else has.
 
 #![allow(
     clippy::unwrap_used,
@@ -26,10 +26,10 @@ use yfslam::image::RgbImage;
 use yfslam::{Config, Detection, Detector, DetectorError, Execution, Slam};
 use yfslam_synth::{CLASS_NAMES, World, parse};
 
-/// What stands in the world, by its place in [`CLASS_NAMES`].
+/// Class of the static box, as an index into [`CLASS_NAMES`].
 const BOX: usize = 3;
 
-/// Finds what the renderer knows of the frame that is being tracked.
+/// Detects the exact objects of the frame that is tracked.
 struct Oracle {
     names: Vec<String>,
     boxes: Arc<Mutex<Vec<Detection>>>,
@@ -46,7 +46,7 @@ impl Detector for Oracle {
     }
 }
 
-/// The map of a world in which a detector finds everything exactly.
+/// Returns the map of a world with exact detections.
 fn survey_of(world: &World) -> Survey {
     let boxes = Arc::new(Mutex::new(Vec::new()));
     let oracle = Oracle { names: CLASS_NAMES.map(str::to_owned).to_vec(), boxes: boxes.clone() };
@@ -72,7 +72,7 @@ fn survey_of(world: &World) -> Survey {
     mapper.into_survey(slam.map())
 }
 
-/// Voxels in which the exact surface of the box lies that the pieces saw.
+/// Returns the voxels with the exact surface of the box that the patches observe.
 fn true_voxels(survey: &Survey, volume: &Volume, world: &World) -> BTreeSet<Voxel> {
     let camera = &world.config().camera;
     let turn = volume.pose(0).unwrap() * survey.pieces[0].t_world_cam.inverse() * t_survey_world(survey, world);
@@ -92,49 +92,49 @@ fn true_voxels(survey: &Survey, volume: &Volume, world: &World) -> BTreeSet<Voxe
     voxels
 }
 
-/// How many voxels the box fills, how many of them are named, how many others are, and how many have the name of something else.
-fn judge_names(survey: &Survey, world: &World) -> [usize; 4] {
+/// Returns the number of voxels of the box, of those with its class, of other voxels with its class, and of those with another class.
+fn count_named(survey: &Survey, world: &World) -> [usize; 4] {
     let volume = survey.volume(&DenseConfig::default(), &up::of_survey(survey), |_| {});
     let (truth, found) = (true_voxels(survey, &volume, world), classes(survey, &volume, |_| {}));
     let near = |[x, y, z]: Voxel| (0..27).any(|i| truth.contains(&[x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]));
     let mut counts = [0; 4];
     for voxel in volume.voxels().filter(|known| known.occupied).map(|known| known.voxel) {
-        let (class, stands) = (usize::from(found.get(voxel)), truth.contains(&voxel));
+        let (class, occupied) = (usize::from(found.get(voxel)), truth.contains(&voxel));
         let is_named = class == BOX + 1;
-        let is = [stands, stands && is_named, !near(voxel) && is_named, class != 0 && !is_named];
+        let is = [occupied, occupied && is_named, !near(voxel) && is_named, class != 0 && !is_named];
         counts.iter_mut().zip(is).for_each(|(count, is)| *count += usize::from(is));
     }
     counts
 }
 
 #[test]
-fn a_box_that_stands_among_walkers_is_named_and_little_else_also_if_it_is_missed_in_half_of_the_views() {
+fn a_box_among_walking_people_has_its_class_also_if_it_is_not_detected_in_half_of_the_frames() {
     let config = parse("synth:walking_xyz?moved=on&width=320&height=240&frames=150&seed=4").unwrap();
     let world = World::new(&config).unwrap();
     let mut survey = survey_of(&world);
     assert_eq!(survey.class_names, CLASS_NAMES);
-    let [stands, named, beyond, others] = judge_names(&survey, &world);
-    println!("{named} of {stands} voxels named, {beyond} beyond, {others} with another name");
-    assert!(stands > 100 && named * 100 >= stands * 95 && beyond * 20 <= stands && others == 0);
+    let [occupied, named, beyond, others] = count_named(&survey, &world);
+    println!("{named} of {occupied} voxels named, {beyond} beyond, {others} with another name");
+    assert!(occupied > 100 && named * 100 >= occupied * 95 && beyond * 20 <= occupied && others == 0);
 
-    products_tell_them(&survey);
+    products_have_classes(&survey);
 
     for one in survey.pieces.iter_mut().skip(1).step_by(2) {
         one.piece = one.piece.clone().with_classes(&survey.grid, |_| 0);
     }
-    let [stands, named, beyond, others] = judge_names(&survey, &world);
+    let [occupied, named, beyond, others] = count_named(&survey, &world);
     println!(
-        "missed in half of the views: {named} of {stands} voxels named, {beyond} beyond, {others} with another name"
+        "missed in half of the views: {named} of {occupied} voxels named, {beyond} beyond, {others} with another name"
     );
-    assert!(named * 4 >= stands * 3 && beyond * 20 <= stands && others == 0);
+    assert!(named * 4 >= occupied * 3 && beyond * 20 <= occupied && others == 0);
 }
 
-/// `yfslam map` names them in all products that can, and says how many there are.
-fn products_tell_them(survey: &Survey) {
+/// `yfslam map` writes classes to all products that can hold them, and prints their counts.
+fn products_have_classes(survey: &Survey) {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("dense.map"), encode(survey).unwrap()).unwrap();
-    let said = succeeds(folder.path(), &["map", "dense.map", "--cloud", "--octomap", "--out", "out"]).stdout;
-    assert!(said.contains("classes, in voxels: box 1"), "{said}");
+    let printed = succeeds(folder.path(), &["map", "dense.map", "--cloud", "--octomap", "--out", "out"]).stdout;
+    assert!(printed.contains("classes, in voxels: box 1"), "{printed}");
     let read = |name: &str| fs::read(folder.path().join("out").join(name)).unwrap();
     let head = |name: &str| String::from_utf8_lossy(&read(name)[..500]).into_owned();
     assert!(
@@ -147,5 +147,5 @@ fn products_tell_them(survey: &Survey) {
     let entry = &legend["classes"][0];
     assert_eq!((entry["class"].as_u64(), entry["name"].as_str()), (Some(4), Some("box")));
     let named = entry["voxels"].as_u64().unwrap();
-    assert!(said.contains(&format!("box {named}; {} unknown", legend["unknown"])), "{said}\n{legend}");
+    assert!(printed.contains(&format!("box {named}; {} unknown", legend["unknown"])), "{printed}\n{legend}");
 }

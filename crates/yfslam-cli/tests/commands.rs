@@ -1,4 +1,4 @@
-//! `eval`, `info`, `demo`, `config`, `completions` and the help, as a user meets them.
+//! The commands `eval`, `ape`, `rpe`, `info`, `demo`, `config`, `completions`, and the help.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -19,7 +19,7 @@ fn trajectory(error_m: f64) -> String {
 }
 
 #[test]
-fn eval_tells_the_errors_and_the_improvement() {
+fn eval_prints_the_errors_and_the_improvement() {
     let folder = tempfile::tempdir().unwrap();
     for (name, error_m) in [("truth.txt", 0.0), ("good.txt", 0.01), ("bad.txt", 0.04)] {
         fs::write(folder.path().join(name), trajectory(error_m)).unwrap();
@@ -46,7 +46,30 @@ fn eval_tells_the_errors_and_the_improvement() {
 }
 
 #[test]
-fn info_tells_what_was_found_even_where_a_run_would_fail() {
+fn ape_and_rpe_take_the_options_of_evo_and_print_one_error() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, error_m) in [("truth.txt", 0.0), ("estimate.txt", 0.01)] {
+        fs::write(folder.path().join(name), trajectory(error_m)).unwrap();
+    }
+    let run = |args: &[&str]| succeeds(folder.path(), args).stdout;
+    let ape = run(&["ape", "tum", "truth.txt", "estimate.txt", "-va", "-r", "trans_part"]);
+    assert!(ape.contains("ATE, SE(3) (m)") && ape.contains("0.0100") && !ape.contains("RPE"), "{ape}");
+    assert!(run(&["ape", "truth.txt", "estimate.txt", "-as"]).contains("ATE, Sim(3) (m)"));
+    let rpe = run(&["rpe", "truth.txt", "estimate.txt", "-r", "trans_part", "-d", "2", "-u", "f", "--all_pairs"]);
+    assert!(rpe.contains("RPE per 2 frames, all pairs (m)") && !rpe.contains("(deg)"), "{rpe}");
+    let rpe = run(&["rpe", "truth.txt", "estimate.txt", "-r", "full", "-u", "s", "--t_max_diff", "0.02"]);
+    assert!(rpe.contains("RPE per 1 s, all pairs (m)") && rpe.contains("RPE per 1 s, all pairs (deg)"), "{rpe}");
+    let refused = |args: &[&str], words: &[&str]| fails(folder.path(), args, words);
+    refused(&["ape", "truth.txt", "estimate.txt", "-r", "angle_deg"], &["trans_part", "yfslam rpe"]);
+    refused(&["ape", "truth.txt", "estimate.txt", "-s"], &["--align"]);
+    refused(&["ape", "kitti", "truth.txt", "estimate.txt"], &["kitti", "TUM format"]);
+    refused(&["ape", "truth.txt", "estimate.txt", "-ap"], &["--plot", "--report"]);
+    refused(&["rpe", "truth.txt", "estimate.txt", "-d", "1.5"], &["1.5 frames", "whole number"]);
+    refused(&["rpe", "truth.txt", "estimate.txt", "-u", "d"], &["'d'", "f, s, m"]);
+}
+
+#[test]
+fn info_describes_a_sequence_even_if_a_run_would_fail() {
     let folder = tempfile::tempdir().unwrap();
     record(&folder.path().join("seq"));
     let text = succeeds(folder.path(), &["info", "seq"]).stdout;
@@ -78,14 +101,14 @@ fn the_demo_compares_all_methods_and_says_where_the_boxes_come_from() {
         assert_eq!(report["frames"]["tracked"], 24);
         errors_m.push(common::ate_rmse(&report));
     }
-    // Without a filter the people lead the camera astray: 6.8 to 19 times as far as `yf` errs over the seeds 1 to 5.
+    // Without a filter the error is 6.8 to 19 times that of `yf` for the seeds 1 to 5.
     let [none, boxes, yf, full] = errors_m[..] else { unreachable!("four methods") };
     assert!(boxes.max(yf).max(full) < 0.01, "boxes {boxes} m, yf {yf} m, full {full} m");
     assert!(none > 4.0 * yf && none > 4.0 * full, "none {none} m, yf {yf} m, full {full} m");
 }
 
 #[test]
-fn the_printed_configuration_is_one_that_a_run_takes() {
+fn the_printed_configuration_can_be_read_again() {
     let folder = tempfile::tempdir().unwrap();
     let text = succeeds(folder.path(), &["config", "--method", "none", "--seed", "5"]).stdout;
     assert!(text.contains("method = \"none\"") && text.contains("seed = 5"), "{text}");
@@ -94,10 +117,10 @@ fn the_printed_configuration_is_one_that_a_run_takes() {
 }
 
 #[test]
-fn help_names_every_command_and_completions_exist_for_every_shell() {
+fn help_lists_every_command_and_completions_exist_for_every_shell() {
     let folder = tempfile::tempdir().unwrap();
     let help = succeeds(folder.path(), &["--help"]).stdout;
-    for command in ["run", "eval", "demo", "detect", "synth", "bench", "info", "config", "completions"] {
+    for command in ["run", "eval", "ape", "rpe", "demo", "detect", "synth", "bench", "info", "config", "completions"] {
         assert!(help.contains(&format!("  {command} ")), "{help}");
         let own = succeeds(folder.path(), &[command, "--help"]).stdout;
         assert!(own.contains("Examples:"), "{own}");

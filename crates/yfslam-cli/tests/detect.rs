@@ -1,4 +1,4 @@
-//! `yfslam detect`: boxes of images as JSON and as pictures, and words for what cannot be read.
+//! `yfslam detect`: boxes as JSON and drawn on images, and errors for images that cannot be read.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -12,7 +12,7 @@ use yfslam::image::RgbImage;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
 
-/// Eight pictures of people in an office: `rec/rgb`.
+/// Renders eight images of people in an office into `rec/rgb`.
 fn render(root: &Path) {
     succeeds(root, &["synth", "walking_static?people=3&share=0.5&frames=8", "--out", "rec", "-q"]);
 }
@@ -28,14 +28,14 @@ fn pixels(path: &Path) -> RgbImage {
 }
 
 #[test]
-fn a_folder_gives_a_line_for_each_image_and_a_picture_with_its_boxes_the_same_on_every_run() {
+fn a_folder_gives_a_line_for_each_image_and_an_image_with_boxes_the_same_on_every_run() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     render(root);
-    fs::create_dir_all(root.join("a/pictures")).unwrap();
-    fs::write(root.join("a/pictures/000007-old.png"), "").unwrap();
-    fs::write(root.join("a/pictures/mine.png"), "").unwrap();
-    let output = succeeds(root, &["detect", "rec/rgb", "--pictures", "--out", "a"]);
+    fs::create_dir_all(root.join("a/images")).unwrap();
+    fs::write(root.join("a/images/000007-old.png"), "").unwrap();
+    fs::write(root.join("a/images/mine.png"), "").unwrap();
+    let output = succeeds(root, &["detect", "rec/rgb", "--images", "--out", "a"]);
     succeeds(root, &["detect", "rec/rgb", "--pictures", "--out", "b", "-q"]);
     assert_eq!(fs::read(root.join("a/boxes.json")).unwrap(), fs::read(root.join("b/boxes.json")).unwrap());
     let list = boxes(&root.join("a"));
@@ -46,7 +46,7 @@ fn a_folder_gives_a_line_for_each_image_and_a_picture_with_its_boxes_the_same_on
     for (index, image) in images.iter().enumerate() {
         let file = image["file"].as_str().unwrap();
         let stem = Path::new(file).file_stem().unwrap().to_str().unwrap();
-        let drawn = pixels(&root.join(format!("a/pictures/{index:06}-{stem}.png")));
+        let drawn = pixels(&root.join(format!("a/images/{index:06}-{stem}.png")));
         let plain = pixels(&root.join(file));
         assert_eq!((image["width"].as_u64(), image["height"].as_u64()), (Some(640), Some(480)));
         let boxes = image["boxes"].as_array().unwrap();
@@ -60,20 +60,20 @@ fn a_folder_gives_a_line_for_each_image_and_a_picture_with_its_boxes_the_same_on
         found += boxes.len();
     }
     assert!(found > 0 && output.stdout.contains(&format!("{found} × person found in 8 images")), "{}", output.stdout);
-    let mut left: Vec<_> = fs::read_dir(root.join("a/pictures")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    let mut left: Vec<_> = fs::read_dir(root.join("a/images")).unwrap().map(|e| e.unwrap().file_name()).collect();
     left.sort();
     assert_eq!(left.len(), 9, "{left:?}");
     assert!(left.contains(&"mine.png".into()) && !left.contains(&"000007-old.png".into()));
 }
 
-/// Left, top, right and bottom edge of each box, best first.
+/// Returns left, top, right and bottom edge of each box, best first.
 fn edges(image: &Value) -> Vec<[f64; 4]> {
     let boxes = image["boxes"].as_array().unwrap().iter();
     boxes.map(|found| std::array::from_fn(|side| found["bbox"][side].as_f64().unwrap())).collect()
 }
 
 #[test]
-fn people_seen_by_a_camera_that_lies_on_its_side_are_found_as_upright_ones_are() {
+fn people_in_images_of_a_camera_on_its_side_are_detected_as_in_upright_images() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     render(root);
@@ -81,7 +81,7 @@ fn people_seen_by_a_camera_that_lies_on_its_side_are_found_as_upright_ones_are()
     for file in fs::read_dir(root.join("rec/rgb")).unwrap().map(|entry| entry.unwrap().path()) {
         let upright = pixels(&file);
         let (width, height) = (upright.width(), upright.height());
-        // What was right is up now: the camera is rolled clockwise.
+        // The right side becomes the upper side: the camera is rolled clockwise.
         let turned = |index: usize| *upright.get(width - 1 - index / height, index % height).unwrap();
         let lying = RgbImage::from_vec(height, width, (0..width * height).map(turned).collect()).unwrap();
         write_color_png(&root.join("lying").join(file.file_name().unwrap()), &lying).unwrap();
@@ -108,7 +108,7 @@ fn people_seen_by_a_camera_that_lies_on_its_side_are_found_as_upright_ones_are()
 }
 
 #[test]
-fn a_higher_threshold_keeps_the_best_boxes_alone() {
+fn a_higher_threshold_keeps_only_the_best_boxes() {
     let folder = tempfile::tempdir().unwrap();
     render(folder.path());
     let scores = |score: &str| -> Vec<f64> {
@@ -117,7 +117,7 @@ fn a_higher_threshold_keeps_the_best_boxes_alone() {
         let found = list["images"].as_array().unwrap().iter().flat_map(|image| image["boxes"].as_array().unwrap());
         found.map(|found| found["score"].as_f64().unwrap()).collect()
     };
-    // Halfway between the least and the best, whatever the network gives.
+    // Halfway between the lowest and the highest score.
     let many = scores("0.05");
     let (least, best) = many.iter().fold((1.0f64, 0.0f64), |(low, high), score| (low.min(*score), high.max(*score)));
     let middle = format!("{:.3}", 0.5 * (least + best));
@@ -128,13 +128,13 @@ fn a_higher_threshold_keeps_the_best_boxes_alone() {
 }
 
 #[test]
-fn an_image_that_cannot_be_read_is_named_and_the_others_are_done() {
+fn an_image_that_cannot_be_read_is_reported_and_the_others_are_processed() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     write_color_png(&root.join("images/good.png"), &RgbImage::new(40, 30)).unwrap();
     let bytes = fs::read(root.join("images/good.png")).unwrap();
     fs::write(root.join("images/cut.png"), &bytes[..bytes.len() / 2]).unwrap();
-    fs::write(root.join("images/notes.txt"), "not looked at").unwrap();
+    fs::write(root.join("images/notes.txt"), "not an image").unwrap();
     fs::write(root.join("photo.jpg"), "RIFF....WEBP").unwrap();
     let output = yfslam(root, &["detect", "images", "photo.jpg", "--out", "out"]);
     assert!(!output.success);
@@ -147,16 +147,16 @@ fn an_image_that_cannot_be_read_is_named_and_the_others_are_done() {
 }
 
 #[test]
-fn what_cannot_be_done_is_said_before_the_first_image() {
+fn unusable_arguments_are_refused_before_the_first_image() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     fs::create_dir_all(root.join("seq/rgb")).unwrap();
     fs::create_dir(root.join("empty")).unwrap();
     write_color_png(&root.join("a.png"), &RgbImage::new(40, 30)).unwrap();
-    fails(root, &["detect", "a.png", "nowhere.png"], &["there is no nowhere.png", "check the path"]);
+    fails(root, &["detect", "a.png", "nowhere.png"], &["nowhere.png does not exist", "check the path"]);
     fails(root, &["detect", "empty"], &["empty holds no images", ".png, .jpg or .jpeg"]);
     fails(root, &["detect", "seq"], &["did you mean seq/rgb?"]);
-    fails(root, &["detect", "a.png", "--class", "unicorn"], &["'unicorn'", "it knows: person"]);
+    fails(root, &["detect", "a.png", "--class", "unicorn"], &["'unicorn'", "its classes are: person"]);
     fails(root, &["detect", "a.png", "--score", "1.5"], &["score_threshold = 1.5", "between 0 and 1"]);
     fails(root, &["detect", "a.png", "--score", "-1"], &["score_threshold = -1"]);
     fails(root, &["detect", "a.png", "--detector", "nowhere.onnx"], &["nowhere.onnx", "check the path"]);
@@ -165,7 +165,7 @@ fn what_cannot_be_done_is_said_before_the_first_image() {
 }
 
 #[test]
-fn classes_of_another_network_are_told_apart() {
+fn classes_of_another_network_are_kept_apart() {
     let (Some(model), Some(sequence)) =
         (real_data("models/yolo-fastestv2-coco.onnx"), real_data("rgbd/tum_fr1_xyz_dev/rgb"))
     else {

@@ -1,4 +1,4 @@
-//! `yfslam detect` with a network that segments: masks in `boxes.json` and in pictures.
+//! `yfslam detect` with a network that segments: masks in `boxes.json` and in images.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -15,7 +15,7 @@ use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
 
 #[test]
-fn each_object_of_a_network_that_segments_has_its_own_mask_drawn_and_in_runs() {
+fn each_object_of_a_network_that_segments_has_its_own_mask_drawn_and_encoded() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     fs::write(root.join("segments.onnx"), net_with_masks().to_onnx()).unwrap();
@@ -23,12 +23,12 @@ fn each_object_of_a_network_that_segments_has_its_own_mask_drawn_and_in_runs() {
     // row 96, the others nothing within their box.
     write_color_png(&root.join("green.png"), &RgbImage::from_vec(320, 192, vec![[0, 255, 0]; 320 * 192]).unwrap())
         .unwrap();
-    succeeds(root, &["detect", "green.png", "--detector", "segments.onnx", "--pictures", "--out", "out"]);
+    succeeds(root, &["detect", "green.png", "--detector", "segments.onnx", "--images", "--out", "out"]);
     let list: Value = serde_json::from_str(&fs::read_to_string(root.join("out/boxes.json")).unwrap()).unwrap();
     let boxes = list["images"][0]["boxes"].as_array().unwrap();
     assert_eq!(boxes.len(), BOXES);
-    let mut picture = RgbImage::default();
-    decode_color(&fs::read(root.join("out/pictures/000000-green.png")).unwrap(), None, &mut picture).unwrap();
+    let mut image = RgbImage::default();
+    decode_color(&fs::read(root.join("out/images/000000-green.png")).unwrap(), None, &mut image).unwrap();
     for (index, found) in boxes.iter().enumerate() {
         let [left, middle] = [32 + 20 * index, 40 + 20 * index];
         assert_eq!((found["class"].as_str(), &found["mask"]["size"]), (Some("green"), &json!([192, 320])));
@@ -38,8 +38,8 @@ fn each_object_of_a_network_that_segments_has_its_own_mask_drawn_and_in_runs() {
         };
         let counts = if index % 2 == 0 { column(left) } else { vec![320 * 192] };
         assert_eq!(found["mask"]["counts"], json!(counts), "{index}");
-        // Some of the colour of the class in the lower part of the box, where no bar is.
-        let [red, green, blue] = *picture.get(middle, 88).unwrap();
+        // Part of the colour of the class in the lower part of the box, where there is no bar.
+        let [red, green, blue] = *image.get(middle, 88).unwrap();
         assert_eq!(blue > 50, index % 2 == 0, "{index}: {red} {green} {blue}");
     }
 }

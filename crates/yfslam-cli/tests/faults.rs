@@ -1,4 +1,4 @@
-//! Faults of camera and driver: the run ends in order, every frame is accounted for, and the pose is found again or called lost.
+//! Faults of camera and driver: the run ends normally, every frame is counted, and the camera is relocalised or lost.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -8,11 +8,11 @@ use std::path::Path;
 use common::{fails, report, succeeds};
 use serde_json::Value;
 
-/// 45 frames in 1.5 s; the fault strikes 12 of them.
+/// 45 frames in 1.5 s; 12 of them have the fault.
 const WORLD: &str = "walking_xyz?people=2&share=0.2&width=320&height=240&frames=45";
 const WHEN: &str = "0.5+0.4";
 const FRAMES: u64 = 45;
-const STRUCK: u64 = 12;
+const FAULTY: u64 = 12;
 
 fn count(report: &Value, key: &str) -> u64 {
     report["frames"][key].as_u64().unwrap()
@@ -24,8 +24,8 @@ fn run(folder: &Path, sequence: &str, faults: &[&str], out: &str) -> Value {
     report(&folder.join(out))
 }
 
-/// Runs with one fault and checks what holds for all of them; `skipped` are the frames that SLAM must not see.
-fn strike(kind: &str, frames: u64, skipped: u64, reason: &str) -> Value {
+/// Runs with one fault and checks what holds for all faults; `skipped` is the number of frames that SLAM must not get.
+fn run_with_fault(kind: &str, frames: u64, skipped: u64, reason: &str) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let fault = format!("{kind}@{WHEN}");
     let report = run(folder.path(), &format!("synth:{WORLD}"), &[&fault], "out");
@@ -34,44 +34,44 @@ fn strike(kind: &str, frames: u64, skipped: u64, reason: &str) -> Value {
     assert_eq!(tracked + lost + before, read, "{kind}: every frame has a state");
     assert_eq!(report["frames"]["skipped_by_reason"].get(reason).and_then(Value::as_u64).unwrap_or(0), skipped);
     assert_eq!(report["faults"].as_array().unwrap().len(), 1);
-    // The pose before the fault stands, and what is not tracked is called lost.
+    // Poses before the fault remain, and frames that are not tracked are lost.
     assert!(tracked >= 15, "{kind}: {tracked} tracked");
     let live = std::fs::read_to_string(folder.path().join("out/live.txt")).unwrap();
     assert_eq!(live.lines().filter(|line| !line.starts_with('#')).count() as u64, tracked, "{kind}");
-    // Judged by all frames of the world, faults or not.
+    // Evaluated with all frames of the world, also those with faults.
     assert_eq!(report["evaluation"]["coverage"]["expected"], FRAMES, "{kind}: {}", report["evaluation"]["coverage"]);
     report
 }
 
 #[test]
-fn dropped_frames_are_missed_and_the_pose_is_found_again() {
-    let report = strike("dropped", FRAMES - STRUCK, 0, "");
-    assert_eq!(count(&report, "tracked"), FRAMES - STRUCK);
+fn tracking_continues_after_dropped_frames() {
+    let report = run_with_fault("dropped", FRAMES - FAULTY, 0, "");
+    assert_eq!(count(&report, "tracked"), FRAMES - FAULTY);
 }
 
 #[test]
 fn repeated_frames_are_refused_once_each() {
-    let report = strike("repeated", FRAMES + STRUCK, STRUCK, "refused by the tracker");
+    let report = run_with_fault("repeated", FRAMES + FAULTY, FAULTY, "refused by the tracker");
     assert_eq!(count(&report, "tracked"), FRAMES);
 }
 
 #[test]
 fn late_frames_are_refused() {
-    let report = strike("late", FRAMES, STRUCK / 2, "refused by the tracker");
-    assert_eq!(count(&report, "tracked"), FRAMES - STRUCK / 2);
+    let report = run_with_fault("late", FRAMES, FAULTY / 2, "refused by the tracker");
+    assert_eq!(count(&report, "tracked"), FRAMES - FAULTY / 2);
 }
 
 #[test]
-fn white_and_black_pictures_are_called_lost_and_no_pose_is_made_up() {
+fn the_camera_is_lost_in_white_and_black_images_and_has_no_pose() {
     for kind in ["blank", "black"] {
-        let report = strike(kind, FRAMES, 0, "");
-        assert!(count(&report, "lost") + count(&report, "before_map") >= STRUCK, "{kind}: {}", report["frames"]);
+        let report = run_with_fault(kind, FRAMES, 0, "");
+        assert!(count(&report, "lost") + count(&report, "before_map") >= FAULTY, "{kind}: {}", report["frames"]);
     }
 }
 
 #[test]
-fn a_frozen_picture_does_not_end_the_run() {
-    strike("frozen", FRAMES, 0, "");
+fn a_frozen_image_does_not_end_the_run() {
+    run_with_fault("frozen", FRAMES, 0, "");
 }
 
 #[test]
@@ -81,13 +81,13 @@ fn frames_without_depth_or_time_or_under_a_cover_are_skipped_and_counted() {
         ("covered", "no depth in any pixel"),
         ("nan-stamp", "no time stamp"),
     ] {
-        let report = strike(kind, FRAMES, STRUCK, reason);
-        assert_eq!(count(&report, "tracked"), FRAMES - STRUCK, "{kind}: found again");
+        let report = run_with_fault(kind, FRAMES, FAULTY, reason);
+        assert_eq!(count(&report, "tracked"), FRAMES - FAULTY, "{kind}: tracked after the fault");
     }
 }
 
 #[test]
-fn faults_on_disk_are_those_in_process() {
+fn faults_of_a_recording_equal_those_of_a_world() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     let kinds = ["dropped@0.3+0.1", "repeated@0.5+0.1", "nan-stamp@0.7+0.1", "late@0.9+0.2", "depth-dropout@1.2+0.1"];
@@ -105,7 +105,7 @@ fn faults_on_disk_are_those_in_process() {
         assert_eq!(association[key], expected, "{key}: {association}");
     }
     assert_eq!(count(&disk, "skipped"), 3, "{}", disk["frames"]);
-    // A recording can be struck while it is played, too.
+    // Faults can also be injected while a recording is played.
     let played = run(root, "rec", &["depth-dropout@0.1+0.1"], "played");
     assert_eq!(count(&played, "skipped"), 6, "{}", played["frames"]);
 }

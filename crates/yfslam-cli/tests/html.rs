@@ -1,4 +1,4 @@
-//! `report.html`: one file, well formed, without the network, with the figures of `run.json`, the same on every run.
+//! `report.html`: one well-formed file that loads nothing, with the figures of `run.json`, the same on every run.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -17,7 +17,7 @@ use yfslam_io::write::write_color_png;
 /// Elements that HTML leaves open.
 const VOID: [&str; 2] = ["meta", "img"];
 
-/// What a page holds, read as XML; anything that is not well formed panics.
+/// The content of a page, read as XML; a page that is not well formed panics.
 #[derive(Default)]
 struct Page {
     /// The page without the elements that hold measured times.
@@ -95,7 +95,7 @@ fn page(out: &Path) -> (String, Page) {
     (html, page)
 }
 
-/// The cells of one method are the figures of its `run.json`, as printed.
+/// Checks that the cells of one method have the figures of its `run.json`.
 fn assert_same_figures(page: &Page, method: &str, run: &Value) {
     let mut compared = 0;
     let evaluation = &run["evaluation"];
@@ -135,7 +135,7 @@ fn the_report_of_a_comparison_is_one_well_formed_file_with_the_figures_of_each_r
     for method in ["none", "yf"] {
         assert_same_figures(&page, method, &report(&out.join(method)));
     }
-    // Two views, four errors over time, one chart of bars; three moments or four of each method.
+    // Two views, four errors over time, one chart of bars; three or four snapshots of each method.
     assert_eq!(page.elements["svg"], 7);
     assert!([6, 8].contains(&page.elements["img"]), "{:?}", page.elements);
     assert!(page.loads.iter().all(|load| load.starts_with("data:image/png;base64,")), "{:?}", page.loads);
@@ -150,14 +150,14 @@ fn the_report_of_a_comparison_is_one_well_formed_file_with_the_figures_of_each_r
 }
 
 #[test]
-fn the_same_run_twice_leaves_the_same_report_apart_from_its_times() {
+fn the_same_run_twice_gives_the_same_report_apart_from_times() {
     let args = ["run", "synth:walking_xyz?people=1&width=320&height=240&frames=10", "--report", "--out", "out"];
     let untimed = || {
         let folder = tempfile::tempdir().unwrap();
         succeeds(folder.path(), &args);
         let (_, page) = page(&folder.path().join("out"));
         assert_same_figures(&page, "full", &report(&folder.path().join("out")));
-        assert!(!page.untimed.contains("processor core") && page.text.contains("processor core"));
+        assert!(!page.untimed.contains("processor time") && page.text.contains("processor time"));
         page.untimed
     };
     let (a, b) = (untimed(), untimed());
@@ -177,7 +177,7 @@ fn without_ground_truth_the_report_says_so_and_draws_no_errors() {
 }
 
 #[test]
-fn a_stretch_without_a_pose_is_marked_and_skipped_frames_are_counted() {
+fn lost_frames_are_marked_and_skipped_frames_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let seq = folder.path().join("seq");
     record(&seq);
@@ -191,7 +191,7 @@ fn a_stretch_without_a_pose_is_marked_and_skipped_frames_are_counted() {
         }
     };
     edit_lines(&seq.join("rgb.txt"), |i, line| Some(blind(i, line)));
-    // Few keyframes would begin the map anew instead of being lost.
+    // With few keyframes, the map would be initialised again instead of the camera being lost.
     fs::write(folder.path().join("c.toml"), "[tracking]\nreset_max_keyframes = 0\n").unwrap();
     let args = ["run", "seq", "--method", "none", "--report", "--out", "out", "--config", "c.toml"];
     succeeds(folder.path(), &args);
@@ -204,7 +204,7 @@ fn a_stretch_without_a_pose_is_marked_and_skipped_frames_are_counted() {
 }
 
 #[test]
-fn a_name_made_of_markup_stays_a_name() {
+fn a_name_that_contains_markup_is_escaped() {
     let folder = tempfile::tempdir().unwrap();
     let name = "<script>alert(1)<&'\"--x";
     record(&folder.path().join(name));

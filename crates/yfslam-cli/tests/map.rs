@@ -1,4 +1,4 @@
-//! `yfslam map`: what it writes opens elsewhere, is the same on every run, and shows the world without people.
+//! `yfslam map`: the products can be read by other programs, are the same on every run, and show the world without people.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
@@ -25,16 +25,16 @@ use yfslam::dense::{DenseConfig, Survey, SurveyPiece, Volume, up};
 use yfslam::dynamic::Method;
 use yfslam_synth::{World, parse};
 
-/// Two people walk through the picture.
+/// Two people walk through the image.
 const WORLD: &str = "synth:walking_xyz?width=320&height=240&frames=60";
 
-/// Text at the beginning of a file.
+/// Returns the text at the beginning of a file.
 fn head(path: &Path) -> String {
     let bytes = fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     String::from_utf8_lossy(&bytes[..bytes.len().min(600)]).into_owned()
 }
 
-/// The number behind `key` in a text.
+/// Returns the number behind `key` in a text.
 fn number(text: &str, key: &str) -> usize {
     let rest = text.split(key).nth(1).unwrap_or_else(|| panic!("no '{key}' in {text}"));
     rest.trim_start().split(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
@@ -46,25 +46,25 @@ fn the_products_of_a_run_agree_with_each_other_and_are_the_same_on_every_run() {
     let make = |out: &str| {
         let saved = format!("{out}.map");
         succeeds(folder.path(), &["run", WORLD, "--dense", "--save-map", &saved, "--out", out, "-q"]);
-        let said = succeeds(folder.path(), &["map", out]).stdout;
-        (folder.path().join(out), said)
+        let printed = succeeds(folder.path(), &["map", out]).stdout;
+        (folder.path().join(out), printed)
     };
-    let (first, said) = make("first");
+    let (first, printed) = make("first");
     let map = first.join("map");
-    let points = number(&said, "cloud: ");
-    assert!(points > 1000, "{said}");
+    let points = number(&printed, "cloud: ");
+    assert!(points > 1000, "{printed}");
     assert_eq!(number(&head(&map.join("cloud.ply")), "element vertex "), points);
     let pcd = fs::read(map.join("cloud.pcd")).unwrap();
     assert_eq!(number(&head(&map.join("cloud.pcd")), "POINTS "), points);
     assert_eq!(pcd.len() - (pcd.windows(12).position(|w| w == b"DATA binary\n").unwrap() + 12), 16 * points);
-    assert_eq!(number(&head(&map.join("octomap.bt")), "size "), number(&said, "octomap: "));
+    assert_eq!(number(&head(&map.join("octomap.bt")), "size "), number(&printed, "octomap: "));
     let mesh = head(&map.join("mesh.ply"));
-    assert_eq!(number(&mesh, "element vertex "), number(&said, "mesh: "));
+    assert_eq!(number(&mesh, "element vertex "), number(&printed, "mesh: "));
     let triangles = number(&mesh, "element face ");
     assert!(triangles > 1000, "{triangles}");
     let (grid, yaml) = (fs::read(map.join("grid.pgm")).unwrap(), head(&map.join("grid.yaml")));
-    let (width, height) = (number(&said, "grid: "), number(&said, " × "));
-    assert!(grid.starts_with(format!("P5\n{width} {height}\n255\n").as_bytes()), "{said}");
+    let (width, height) = (number(&printed, "grid: "), number(&printed, " × "));
+    assert!(grid.starts_with(format!("P5\n{width} {height}\n255\n").as_bytes()), "{printed}");
     assert!(yaml.contains("image: grid.pgm\n") && yaml.contains("resolution: 0.05\n"), "{yaml}");
     assert!([0, 205, 254].iter().all(|shade| grid[15..].contains(shade)), "occupied, unknown and free");
 
@@ -86,10 +86,10 @@ fn the_products_of_a_run_agree_with_each_other_and_are_the_same_on_every_run() {
     fails(folder.path(), &["map", "altered.map"], &["altered.map", "it was altered"]);
 
     octomap_reads(&map);
-    reports_show_it(folder.path());
+    reports_show_the_map(folder.path());
 }
 
-/// OctoMap's own tools read both trees, and make of the one what we made.
+/// The tools of OctoMap read both trees, and convert one into the other.
 fn octomap_reads(map: &Path) {
     let convert = |from: &str, to: &str| Command::new("convert_octree").args([from, to]).current_dir(map).output();
     let Ok(output) = convert("octomap.ot", "theirs.bt") else {
@@ -106,7 +106,7 @@ fn octomap_reads(map: &Path) {
     assert!(convert("octomap.bt", "theirs.ot").unwrap().status.success());
 }
 
-fn reports_show_it(folder: &Path) {
+fn reports_show_the_map(folder: &Path) {
     let world = "synth:walking_xyz?width=320&height=240&frames=20";
     succeeds(folder, &["run", world, "--method", "none,yf", "--dense", "--report", "--out", "both", "-q"]);
     let html = fs::read_to_string(folder.join("both/report.html")).unwrap();
@@ -116,7 +116,7 @@ fn reports_show_it(folder: &Path) {
 }
 
 #[test]
-fn what_cannot_be_mapped_is_refused_with_a_cure() {
+fn unusable_input_is_refused_with_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     fails(folder.path(), &["map", "nowhere"], &["nowhere", "yfslam run SEQUENCE --dense"]);
     fs::write(folder.path().join("dense.map"), b"%PDF-1.4").unwrap();
@@ -130,9 +130,9 @@ fn what_cannot_be_mapped_is_refused_with_a_cure() {
 }
 
 #[test]
-fn the_map_of_two_sessions_shows_what_either_has_seen() {
+fn the_map_of_two_sessions_shows_what_both_have_observed() {
     let folder = tempfile::tempdir().unwrap();
-    // Along a corridor to its corner, then from before the corner into the next one.
+    // Along a corridor to its corner, then from there into the next one.
     let world = "synth:corridor_loop?people=0&frames=440&fps=10&width=320&height=240";
     let first = ["run", world, "--end", "60", "--method", "none", "-q", "--dense"];
     succeeds(folder.path(), &[&first[..], &["--save-map", "first.map", "--out", "first"]].concat());
@@ -140,7 +140,7 @@ fn the_map_of_two_sessions_shows_what_either_has_seen() {
     fails(
         folder.path(),
         &[&again[..], &["--save-map", "both.map"]].concat(),
-        &["first.map holds dense pieces", "--dense"],
+        &["first.map holds a dense map", "--dense"],
     );
     succeeds(folder.path(), &[&again[..], &["--dense", "--save-map", "both.map", "--out", "second"]].concat());
     let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
@@ -151,7 +151,7 @@ fn the_map_of_two_sessions_shows_what_either_has_seen() {
     let pieces = |survey: &Survey| survey.pieces.iter().map(|one| one.piece.clone()).collect::<Vec<_>>();
     assert!(earlier >= 8 && both.pieces.len() >= earlier + 6, "{earlier} of {} pieces", both.pieces.len());
     assert_eq!(pieces(&both)[..earlier], pieces(&before));
-    // Each session's part of the pieces, in its places in the map of both.
+    // The patches of each session, where the map of both has them.
     let part = |pieces: &[SurveyPiece]| Survey { pieces: pieces.to_vec(), ..both.clone() };
     let occupied = |survey: &Survey| {
         let volume = survey.volume(&DenseConfig::default(), &up::of_camera(), |_| {});
@@ -166,9 +166,9 @@ fn the_map_of_two_sessions_shows_what_either_has_seen() {
         println!("{} of {} voxels; {kept:.3} of them are in the map of both", part.len(), voxels.len());
         assert!(kept > 0.9 && more > 1.2, "{kept} of a part are in the map of both, which is {more} times as large");
     }
-    let said = succeeds(folder.path(), &["map", "both.map", "--cloud", "--out", "cloud"]).stdout;
-    assert!(number(&said, "cloud: ") * 10 > voxels.len() * 9, "{said}");
-    // Whoever only seeks the camera leaves all of it alone.
+    let printed = succeeds(folder.path(), &["map", "both.map", "--cloud", "--out", "cloud"]).stdout;
+    assert!(number(&printed, "cloud: ") * 10 > voxels.len() * 9, "{printed}");
+    // Localisation changes nothing.
     succeeds(folder.path(), &[&again[..], &["--localise", "--out", "third"]].concat());
     assert_eq!(decode(&read("first.map")).unwrap(), before);
 }
@@ -190,7 +190,7 @@ fn mapped(world: &World, method: Method) -> (Survey, Volume) {
 }
 
 #[test]
-fn people_who_walk_leave_no_ghosts_and_walls_stand_where_they_are() {
+fn walking_people_leave_no_ghosts_and_walls_are_where_they_should_be() {
     let world = world("synth:walking_xyz?width=320&height=240&frames=150");
     let of = |method| {
         let (survey, volume) = mapped(&world, method);
@@ -216,7 +216,7 @@ fn people_who_walk_leave_no_ghosts_and_walls_stand_where_they_are() {
 }
 
 #[test]
-fn after_a_loop_walls_seen_twice_are_as_thin_as_without_drift() {
+fn after_a_loop_walls_observed_twice_are_as_thin_as_without_drift() {
     let world = world("synth:corridor_loop?people=0&frames=440&fps=10&width=320&height=240");
     let config = DenseConfig::default();
     let way = |loops| Way { method: Method::None, loops };

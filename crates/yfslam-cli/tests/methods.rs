@@ -1,4 +1,4 @@
-//! Several methods in one run: each with the results it has alone, and none hindered by another.
+//! Several methods in one run: each has the results of a separate run.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -8,7 +8,7 @@ use std::path::Path;
 
 use common::{ate_rmse, fails, record, report, succeeds};
 
-/// People who walk through the picture, small enough to be quick.
+/// People who walk through the image; small enough to be quick.
 const WALKING: &str = "synth:walking_xyz?people=2&share=0.3&width=320&height=240&frames=30";
 
 const METHODS: [&str; 3] = ["none", "boxes", "yf"];
@@ -23,7 +23,7 @@ fn assert_same_together_and_alone(folder: &Path, args: &[&str]) {
             assert_eq!(fs::read(together.join(name)).unwrap(), fs::read(alone.join(name)).unwrap(), "{method}: {name}");
         }
         let (together, alone) = (report(&together), report(&alone));
-        for key in ["evaluation", "frames", "boxes", "config", "places", "map"] {
+        for key in ["evaluation", "frames", "boxes", "config", "loops_and_relocalisation", "map"] {
             assert_eq!(together[key], alone[key], "{method}: {key}");
         }
         assert_eq!(together["dynamic"]["dynamic_features"], alone["dynamic"]["dynamic_features"], "{method}");
@@ -31,19 +31,19 @@ fn assert_same_together_and_alone(folder: &Path, args: &[&str]) {
 }
 
 #[test]
-fn methods_run_together_leave_what_each_leaves_alone_faults_included() {
+fn methods_run_together_give_the_results_of_separate_runs_also_with_faults() {
     let folder = tempfile::tempdir().unwrap();
     let faults = ["--fault", "repeated@0.3+0.1", "--fault", "covered@0.6+0.1", "--overlay"];
     assert_same_together_and_alone(folder.path(), &[&["run", WALKING][..], &faults].concat());
     for method in METHODS {
-        let pictures = fs::read_dir(folder.path().join("all").join(method).join("overlay")).unwrap();
-        assert!(pictures.count() > 20, "{method}");
+        let images = fs::read_dir(folder.path().join("all").join(method).join("overlay")).unwrap();
+        assert!(images.count() > 20, "{method}");
     }
     assert!(!folder.path().join("all/report.html").exists() && !folder.path().join("all/trajectory.txt").exists());
 }
 
 #[test]
-fn methods_share_a_detector_and_leave_what_each_leaves_with_its_own() {
+fn methods_that_share_a_detector_give_the_results_of_separate_runs() {
     let folder = tempfile::tempdir().unwrap();
     assert_same_together_and_alone(folder.path(), &["run", WALKING, "--detector", "embedded"]);
     let all = folder.path().join("all");
@@ -51,12 +51,12 @@ fn methods_share_a_detector_and_leave_what_each_leaves_with_its_own() {
     assert_eq!(METHODS.map(detections), [None, Some(30), Some(30)]);
     assert_eq!(report(&all.join("yf"))["boxes"]["detector"]["file"], "embedded");
     assert_eq!(report(&all.join("none"))["boxes"], "none");
-    // The network sees something of what the renderer knows.
+    // The network detects some of the people.
     assert!(report(&all.join("yf"))["dynamic"]["dynamic_features"].as_u64().unwrap() > 0);
 }
 
 #[test]
-fn pictures_of_a_rolled_camera_are_turned_for_the_detector_for_one_method_and_for_several() {
+fn images_of_a_rolled_camera_are_turned_upright_for_the_detector_for_one_method_and_for_several() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     let world = WALKING.replace("walking_xyz", "walking_rpy").replace("frames=30", "frames=60");
@@ -71,7 +71,7 @@ fn pictures_of_a_rolled_camera_are_turned_for_the_detector_for_one_method_and_fo
 }
 
 #[test]
-fn a_detector_that_looks_at_every_third_frame_does_so_for_one_method_and_for_several() {
+fn detection_on_every_third_frame_works_for_one_method_and_for_several() {
     let folder = tempfile::tempdir().unwrap();
     assert_same_together_and_alone(folder.path(), &["run", WALKING, "--detector", "embedded", "--detect-every", "3"]);
     for out in ["yf", "all/yf"] {
@@ -82,20 +82,20 @@ fn a_detector_that_looks_at_every_third_frame_does_so_for_one_method_and_for_sev
 }
 
 #[test]
-fn a_detector_that_looks_once_in_three_seconds_is_enough_to_follow_walkers() {
+fn detection_every_three_seconds_is_enough_to_track_walking_people() {
     let folder = tempfile::tempdir().unwrap();
     for (world, limit_m) in [("walking_xyz", 0.02), ("walking_static", 0.02)] {
         let spec = format!("synth:{world}?width=320&height=240&fps=15&frames=45");
         succeeds(folder.path(), &["run", &spec, "--detect-every", "45", "--out", world, "-q"]);
         let report = report(&folder.path().join(world));
         assert_eq!(report["frames"]["tracked"], 45, "{world}");
-        // Without the tracks that follow bodies it is .1 to .3 m.
+        // Without tracks of people it is 0.1 to 0.3 m.
         assert!(ate_rmse(&report) < limit_m, "{world}: {}", ate_rmse(&report));
     }
 }
 
 #[test]
-fn a_picture_that_people_fill_by_four_fifths_is_tracked() {
+fn an_image_that_people_cover_by_four_fifths_is_tracked() {
     let folder = tempfile::tempdir().unwrap();
     let world = "synth:walking_static?people=6&share=0.8&frames=45";
     succeeds(folder.path(), &["run", world, "--out", "out", "-q"]);
@@ -105,7 +105,7 @@ fn a_picture_that_people_fill_by_four_fifths_is_tracked() {
 }
 
 #[test]
-fn a_recording_without_boxes_is_looked_at_by_the_network_in_the_program() {
+fn the_network_in_the_program_detects_people_in_a_recording_without_boxes() {
     let folder = tempfile::tempdir().unwrap();
     record(&folder.path().join("seq"));
     let output = succeeds(folder.path(), &["run", "seq", "--out", "out"]);
@@ -122,7 +122,7 @@ fn a_recording_without_boxes_is_looked_at_by_the_network_in_the_program() {
 }
 
 #[test]
-fn a_recording_is_compared_as_a_world_is() {
+fn methods_are_compared_on_a_recording_as_on_a_world() {
     let folder = tempfile::tempdir().unwrap();
     let world = WALKING.trim_start_matches("synth:");
     succeeds(folder.path(), &["synth", world, "--out", "rec", "-q"]);
@@ -135,13 +135,13 @@ fn a_recording_is_compared_as_a_world_is() {
 }
 
 #[test]
-fn a_method_that_fails_says_why_in_its_folder_and_does_not_stop_the_others() {
+fn a_method_that_fails_writes_the_reason_to_its_folder_and_does_not_stop_the_others() {
     let folder = tempfile::tempdir().unwrap();
     record(&folder.path().join("seq"));
-    // A file where pictures should go.
+    // A file in place of the folder for images.
     fs::create_dir_all(folder.path().join("out/none")).unwrap();
     fs::write(folder.path().join("out/none/overlay"), "").unwrap();
-    // Boxes of nobody: the method runs, and needs no network.
+    // A list without boxes: the method runs, and needs no network.
     fs::write(folder.path().join("seq/boxes.json"), r#"{"classes":["person"],"frames":[]}"#).unwrap();
     let args = ["run", "seq", "--overlay", "--out", "out"];
     let output = succeeds(folder.path(), &[&args[..], &["--method", "none,yf"]].concat());
@@ -172,19 +172,19 @@ fn options_for_one_method_are_refused_with_several() {
     fails(folder.path(), &["run", WALKING, "--method", "none,orb"], &["orb", "boxes"]);
 }
 
-/// Short forms of worlds of the suite in which a camera without a filter is led astray.
+/// Short forms of worlds of the suite in which tracking without a filter has a large error.
 const CHAIR: &str = "synth:pushed_chair?width=320&height=240&fps=15";
 const STATIC: &str = "synth:walking_static?width=320&height=240&fps=15&frames=40";
 
 #[test]
-fn dyna_keeps_out_people_and_what_nobody_put_a_box_around_and_ds_needs_the_boxes() {
+fn dyna_drops_people_with_and_without_boxes_and_ds_needs_the_boxes() {
     let folder = tempfile::tempdir().unwrap();
     let of = |out: &str, method: &str| report(&folder.path().join(out).join(method));
     let chair = format!("{CHAIR}&frames=40");
     succeeds(folder.path(), &["run", &chair, "--method", "none,dyna", "--out", "boxes", "-q"]);
     let [none, dyna] = ["none", "dyna"].map(|method| ate_rmse(&of("boxes", method)));
     assert!(4.0 * dyna < none && dyna < 0.01, "dyna {dyna} m, none {none} m");
-    // Boxes of robots, of which there are none: what is found, geometry finds.
+    // Boxes of robots, of which there are none: only geometry finds what moves.
     fs::write(folder.path().join("blind.toml"), "[dynamic]\nmovable = [\"robot\"]\n").unwrap();
     let chair = format!("{CHAIR}&frames=60");
     let blind = ["run", &chair, "--method", "none,ds,dyna", "--config", "blind.toml", "--out", "blind", "-q"];
@@ -196,7 +196,7 @@ fn dyna_keeps_out_people_and_what_nobody_put_a_box_around_and_ds_needs_the_boxes
 }
 
 #[test]
-fn ds_drops_people_who_walk_before_a_camera_that_is_held_still() {
+fn ds_drops_people_who_walk_in_front_of_a_static_camera() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(folder.path(), &["run", STATIC, "--method", "none,ds", "--out", "out", "-q"]);
     let [none, ds] = ["none", "ds"].map(|method| ate_rmse(&report(&folder.path().join("out").join(method))));
@@ -204,7 +204,7 @@ fn ds_drops_people_who_walk_before_a_camera_that_is_held_still() {
 }
 
 #[test]
-fn dms_runs_without_boxes_and_asks_no_network() {
+fn dms_runs_without_boxes_and_without_a_network() {
     let folder = tempfile::tempdir().unwrap();
     let output =
         succeeds(folder.path(), &["run", WALKING, "--method", "dms", "--detector", "embedded", "--out", "out"]);

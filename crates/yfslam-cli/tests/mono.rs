@@ -1,4 +1,4 @@
-//! A single camera: its depth comes from its motion alone, and its unit of length is its own.
+//! A single camera: depth comes from motion only, and the scale is arbitrary.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -16,12 +16,12 @@ use yfslam::{Camera, Config, RgbdFrame, Slam};
 use yfslam_eval::{AlignmentKind, Match, StampedPose, ate};
 use yfslam_synth::World;
 
-/// A desk, seen while the camera moves along its axes, and the same walk through people.
+/// A desk while the camera moves along its axes, without and with people.
 const DESK: &str = "synth:sitting_xyz?people=0&width=320&height=240&frames=90";
 const WALK: &str = "synth:walking_xyz?people=2&share=0.2&width=320&height=240&frames=90";
 
 #[test]
-fn a_single_camera_maps_a_desk_up_to_scale_and_finds_back_into_its_map() {
+fn a_single_camera_maps_a_desk_up_to_scale_and_relocalises_in_its_map() {
     let folder = tempfile::tempdir().unwrap();
     let run = ["run", DESK, "--sensor", "mono"];
     let output = succeeds(folder.path(), &[&run[..], &["--save-map", "desk.map", "--out", "a"]].concat());
@@ -34,7 +34,7 @@ fn a_single_camera_maps_a_desk_up_to_scale_and_finds_back_into_its_map() {
     let (before, tracked) =
         (mapped["frames"]["before_map"].as_u64().unwrap(), mapped["frames"]["tracked"].as_u64().unwrap());
     assert!(before < 50 && before + tracked == 90, "{}", mapped["frames"]);
-    // A way of 0.7 m, most of it aside.
+    // A path of 0.7 m, mostly sideways.
     assert!(ate_rmse(&mapped) < 0.015, "{}", ate_rmse(&mapped));
     let again = [&run[..], &["--load-map", "desk.map", "--localise", "--start", "50", "--out", "b"]].concat();
     succeeds(folder.path(), &again);
@@ -58,9 +58,9 @@ fn a_single_camera_tracks_among_people_with_their_boxes_and_to_the_same_bits_aga
     assert!(a == b);
 }
 
-/// What a camera sees of a far picture that it turns away from by `turn` (axis times angle, radians).
-fn turned(picture: &RgbImage, camera: &Camera, turn: Vector3<f64>) -> RgbImage {
-    let (width, height) = (picture.width(), picture.height());
+/// The image of a far scene after the camera has turned by `turn` (axis times angle, radians).
+fn turned(image: &RgbImage, camera: &Camera, turn: Vector3<f64>) -> RgbImage {
+    let (width, height) = (image.width(), image.height());
     let rotation = Rotation3::new(turn);
     let pixel = |index: usize| {
         let (u, v) = ((index % width) as f64, (index / width) as f64);
@@ -68,7 +68,7 @@ fn turned(picture: &RgbImage, camera: &Camera, turn: Vector3<f64>) -> RgbImage {
         let (x, y) = (camera.fx * ray.x / ray.z + camera.cx, camera.fy * ray.y / ray.z + camera.cy);
         let (column, row) = (x.floor().max(0.0) as usize, y.floor().max(0.0) as usize);
         let (dx, dy) = (x - x.floor(), y - y.floor());
-        let at = |c: usize, r: usize| picture.get(c, r).copied().unwrap_or_default().map(f64::from);
+        let at = |c: usize, r: usize| image.get(c, r).copied().unwrap_or_default().map(f64::from);
         let corners = [at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)];
         let shares = [(1.0 - dx) * (1.0 - dy), dx * (1.0 - dy), (1.0 - dx) * dy, dx * dy];
         [0, 1, 2].map(|k| corners.iter().zip(shares).map(|(c, share)| c[k] * share).sum::<f64>().round() as u8)
@@ -77,7 +77,7 @@ fn turned(picture: &RgbImage, camera: &Camera, turn: Vector3<f64>) -> RgbImage {
 }
 
 #[test]
-fn a_single_camera_that_only_turns_begins_no_map() {
+fn a_single_camera_that_only_turns_initialises_no_map() {
     let world = World::new(&yfslam_synth::parse("sitting_xyz?people=0&frames=1").unwrap()).unwrap();
     let RgbdFrame { color, depth, .. } = world.frame(0).frame;
     let camera = &world.config().camera;
@@ -94,20 +94,20 @@ fn a_single_camera_that_only_turns_begins_no_map() {
     assert_eq!(slam.map().keyframe_count(), 0);
 }
 
-/// Once around an office and a little on.
+/// Once around an office and a little further.
 const ROUND: &str = "walking_xyz?scene=office&motion=loop&people=0&frames=500&fps=12&width=320&height=240";
 
-/// What became of a way around the office.
+/// The results of a path around the office.
 struct Round {
     loops: Vec<LoopClosed>,
-    /// Parts of the way that are in maps apart.
+    /// Number of submaps.
     parts: usize,
     /// Frames with a pose in the largest map, and their error after alignment by a similarity, m.
     tracked: usize,
     ate_m: f64,
 }
 
-/// The same frames with loops, without, and with loops where the camera is carried on in the dark for six seconds.
+/// The same frames with loop closing, without it, and with loop closing where the camera is covered for six seconds.
 fn rounds() -> &'static [Round; 3] {
     // Rendered once for all tests.
     static ROUNDS: OnceLock<[Round; 3]> = OnceLock::new();
@@ -141,20 +141,20 @@ fn rounds() -> &'static [Round; 3] {
 }
 
 #[test]
-fn a_single_camera_that_comes_back_takes_the_drift_of_the_scale_away() {
+fn a_loop_of_a_single_camera_corrects_the_drift_of_the_scale() {
     let [closed, open, _] = rounds();
     assert!(open.loops.is_empty() && closed.tracked == open.tracked && closed.tracked > 400, "{}", closed.tracked);
-    // The unit of length has grown by a fifth on the way.
+    // The unit of length has grown by a fifth along the path.
     let drifts: Vec<f64> = closed.loops.iter().map(|l| l.drift.scaling()).collect();
     assert!(drifts.len() == 1 && (drifts[0].ln() - 1.2f64.ln()).abs() < 0.1, "{drifts:?}");
     assert!(closed.ate_m < 0.06 && closed.ate_m < 0.4 * open.ate_m, "{} m, {} m", closed.ate_m, open.ate_m);
 }
 
 #[test]
-fn a_single_camera_put_elsewhere_joins_two_maps_of_different_scale() {
-    let joined = &rounds()[2];
-    let merged: Vec<_> = joined.loops.iter().map(|l| (l.merged_submaps, l.drift.scaling())).collect();
+fn a_displaced_single_camera_merges_two_submaps_of_different_scale() {
+    let merged_run = &rounds()[2];
+    let merged: Vec<_> = merged_run.loops.iter().map(|l| (l.merged_submaps, l.drift.scaling())).collect();
     assert!(merged.len() == 1 && merged[0].0, "{merged:?}");
-    assert!(joined.parts == 1 && joined.tracked > 250, "{} in {} parts", joined.tracked, joined.parts);
-    assert!(joined.ate_m < 0.2, "{} m, units of length differ by {}", joined.ate_m, merged[0].1);
+    assert!(merged_run.parts == 1 && merged_run.tracked > 250, "{} in {} parts", merged_run.tracked, merged_run.parts);
+    assert!(merged_run.ate_m < 0.2, "{} m, units of length differ by {}", merged_run.ate_m, merged[0].1);
 }

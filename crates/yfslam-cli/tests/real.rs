@@ -1,4 +1,4 @@
-//! Recorded sequences, if they are there: accuracy, and memory.
+//! Recorded sequences, if they are available: accuracy, and memory.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 const MODEL: &str = "models/yolo-fastestv2-coco.onnx";
 
-/// Runs a sequence; `None` if the data is not there.
+/// Runs a sequence; `None` if the data is missing.
 fn run(sequence: &str, method: &str) -> Option<Value> {
     let (sequence, model) = (real_data(sequence)?, real_data(MODEL)?);
     let folder = tempfile::tempdir().unwrap();
@@ -20,7 +20,7 @@ fn run(sequence: &str, method: &str) -> Option<Value> {
 }
 
 #[test]
-fn a_still_desk_is_tracked_within_11_5_mm_with_and_without_the_filter() {
+fn a_static_desk_is_tracked_within_11_5_mm_with_and_without_the_filter() {
     for method in ["none", "yf"] {
         let Some(report) = run("rgbd/tum_fr1_xyz_dev", method) else { return };
         assert_eq!(report["frames"]["tracked"], 300, "{method}");
@@ -39,7 +39,7 @@ fn a_crowd_is_tracked_in_every_frame_within_30_mm_and_120_mb() {
 }
 
 #[test]
-fn a_crowd_with_a_network_on_its_own_thread_leaves_the_same_bytes_twice() {
+fn a_crowd_with_a_network_on_its_own_thread_gives_the_same_bytes_twice() {
     let (Some(sequence), Some(model)) = (real_data("rgbd/bonn_crowd_dev"), real_data(MODEL)) else { return };
     let folder = tempfile::tempdir().unwrap();
     let (sequence, model) = (sequence.to_str().unwrap(), model.to_str().unwrap());

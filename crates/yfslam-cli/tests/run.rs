@@ -1,4 +1,4 @@
-//! `yfslam run` on sequences that anyone can render: accuracy, repeatability, what it leaves behind.
+//! `yfslam run` on synthetic worlds: accuracy, repeatability, output files.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -8,7 +8,7 @@ use std::path::Path;
 
 use common::{SMALL_WORLD, ate_rmse, record, report, succeeds, yfslam};
 
-/// People who walk through the picture, small enough to be quick.
+/// People who walk through the image; small enough to be quick.
 const WALKING: &str = "synth:walking_xyz?people=2&share=0.3&width=320&height=240&frames=40";
 
 /// Files that depend on the input and the configuration alone.
@@ -35,6 +35,15 @@ fn a_walk_among_people_is_tracked_in_every_frame_within_10_mm() {
     for stage in ["render", "features", "dynamic_filter", "tracking", "mapping"] {
         assert!(report["times"][stage]["median_ms"].as_f64().is_some(), "{stage}: {}", report["times"]);
     }
+    let total = report["process_ms_per_frame"].as_f64().unwrap();
+    let parts = report["process_parts_ms_per_frame"].as_object().unwrap();
+    let sum: f64 = parts.values().map(|ms| ms.as_f64().unwrap()).sum();
+    assert!((sum - total).abs() < 0.01 || parts["other"] == 0.0, "{total} ms, {parts:?}");
+    assert!(
+        ["reading", "tracking", "mapping_and_loops"].iter().all(|part| parts[*part].as_f64() > Some(0.0)),
+        "{parts:?}"
+    );
+    assert!(output.stdout.contains("processor time per frame: "), "{}", output.stdout);
     for name in ["trajectory.txt", "live.txt"] {
         let poses = fs::read_to_string(out.join(name)).unwrap();
         assert_eq!(poses.lines().filter(|line| !line.starts_with('#')).count(), 40, "{name}");
@@ -42,7 +51,7 @@ fn a_walk_among_people_is_tracked_in_every_frame_within_10_mm() {
 }
 
 #[test]
-fn the_same_run_twice_leaves_the_same_bytes() {
+fn the_same_run_twice_gives_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     for grouping in ["exact", "ransac"] {
         for out in ["a", "b"] {
@@ -53,7 +62,7 @@ fn the_same_run_twice_leaves_the_same_bytes() {
 }
 
 #[test]
-fn the_settings_left_behind_repeat_the_run() {
+fn the_written_configuration_repeats_the_run() {
     let folder = tempfile::tempdir().unwrap();
     record(&folder.path().join("seq"));
     let args = ["run", "seq", "--method", "none", "--grouping", "ransac", "--seed", "3", "--out", "a", "-q"];
@@ -86,23 +95,23 @@ fn a_recording_of_the_world_is_tracked_to_the_same_bytes_as_the_world() {
 }
 
 #[test]
-fn an_overlay_has_one_picture_a_frame_and_none_of_an_earlier_run() {
+fn an_overlay_has_one_image_for_each_frame_and_none_of_an_earlier_run() {
     let folder = tempfile::tempdir().unwrap();
     record(&folder.path().join("seq"));
-    let pictures = || {
+    let images = || {
         let mut names: Vec<_> =
             fs::read_dir(folder.path().join("o/overlay")).unwrap().map(|e| e.unwrap().file_name()).collect();
         names.sort();
         names
     };
     succeeds(folder.path(), &["run", "seq", "--method", "none", "--overlay", "--out", "o", "--end", "5"]);
-    assert_eq!(pictures(), ["000000.png", "000001.png", "000002.png", "000003.png", "000004.png"]);
+    assert_eq!(images(), ["000000.png", "000001.png", "000002.png", "000003.png", "000004.png"]);
     succeeds(folder.path(), &["run", "seq", "--method", "none", "--overlay", "--out", "o", "--end", "2"]);
-    assert_eq!(pictures(), ["000000.png", "000001.png"]);
+    assert_eq!(images(), ["000000.png", "000001.png"]);
 }
 
 #[test]
-fn quiet_means_quiet() {
+fn a_quiet_run_prints_nothing() {
     let folder = tempfile::tempdir().unwrap();
     record(&folder.path().join("seq"));
     let output = yfslam(folder.path(), &["run", "seq", "--method", "none", "--quiet"]);
@@ -110,7 +119,7 @@ fn quiet_means_quiet() {
 }
 
 #[test]
-fn a_walk_is_tracked_with_boxes_on_every_fifth_frame_and_with_a_detector_that_nobody_waits_for() {
+fn a_walk_is_tracked_with_boxes_on_every_fifth_frame_and_with_an_asynchronous_detector() {
     let folder = tempfile::tempdir().unwrap();
     let every = |n: &str| {
         succeeds(folder.path(), &["run", WALKING, "--detect-every", n, "--out", n, "-q"]);
@@ -126,8 +135,8 @@ fn a_walk_is_tracked_with_boxes_on_every_fifth_frame_and_with_a_detector_that_no
     succeeds(folder.path(), &[&live[..], &["--threaded", "--out", "live", "-q"]].concat());
     let live = report(&folder.path().join("live"));
     assert_eq!(live["frames"]["tracked"], 40);
-    let looks = live["times"]["detector"]["count"].as_u64().unwrap();
-    assert!((1..=40).contains(&looks), "{looks}");
+    let detections = live["times"]["detector"]["count"].as_u64().unwrap();
+    assert!((1..=40).contains(&detections), "{detections}");
     let refused = yfslam(folder.path(), &["run", WALKING, "--detect-every", "0"]);
     assert!(!refused.success && refused.stderr.contains("detect-every"), "{}", refused.stderr);
 }

@@ -18,8 +18,8 @@ use yfslam_synth::World;
 /// A small room without people.
 const ROOM: &str = "walking_xyz?people=0&width=376&height=240&frames=30";
 
-/// Error that a run of [`ROOM`] may have, m. At 3 m, the depth of the room, a tenth of a pixel of disparity is 3 cm at this size; hundreds
-/// of points average that to a few millimetres. A wrong baseline, row, lever arm or time makes it centimetres.
+/// Largest error of a run of [`ROOM`], m. At 3 m, the depth of the room, a tenth of a pixel of disparity is 3 cm at this size; hundreds
+/// of points average that to a few millimetres. A wrong baseline, row, lever arm or time stamp causes centimetres.
 const MAX_ATE_M: f64 = 0.008;
 
 fn world(spec: &str) -> World {
@@ -40,7 +40,7 @@ fn tracked(folder: &Path, sequence: &str, more: &[&str]) -> Value {
 }
 
 #[test]
-fn a_rendered_and_a_recorded_stereo_camera_give_the_same_trajectory_and_a_right_one() {
+fn a_rendered_and_a_recorded_stereo_camera_give_the_same_correct_trajectory() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let spec = &format!("{ROOM}&stereo=0.11");
@@ -52,14 +52,14 @@ fn a_rendered_and_a_recorded_stereo_camera_give_the_same_trajectory_and_a_right_
     tracked(folder.path(), &format!("synth:{spec}"), &["--method", "none"]);
     assert!(first == fs::read(at("out/trajectory.txt")).unwrap(), "the trajectories differ");
     let info = succeeds(folder.path(), &["info", "pairs"]).stdout;
-    assert!(info.contains("TUM RGB-D, stereo") && info.contains("30 left, 30 right pictures"), "{info}");
+    assert!(info.contains("TUM RGB-D, stereo") && info.contains("30 left, 30 right images"), "{info}");
     fails(folder.path(), &["run", "pairs", "--sensor", "rgbd"], &["pairs", "has no depth images", "--sensor"]);
     fails(folder.path(), &["run", "pairs", "--dense"], &["--dense needs depth images"]);
     fails(folder.path(), &["run", "pairs", "--sensor", "mono", "--method", "none", "--end", "2"], &["no trajectory"]);
 }
 
 #[test]
-fn people_are_kept_out_by_every_method_that_boxes_or_outlines_them() {
+fn every_method_with_boxes_or_segmentation_drops_people() {
     let folder = tempfile::tempdir().unwrap();
     let crowd = "synth:walking_xyz?people=3&share=0.5&width=320&height=240&frames=60&stereo=0.2";
     succeeds(folder.path(), &["run", crowd, "--method", "none,boxes,yf,full", "--out", "out"]);
@@ -70,12 +70,12 @@ fn people_are_kept_out_by_every_method_that_boxes_or_outlines_them() {
         let ate_m = ate_rmse(&report);
         println!("{method}: ATE {ate_m:.4} m, unfiltered {unfiltered_m:.4} m");
         assert_eq!(report["frames"]["tracked"], 60, "{method}");
-        // With the filters as they are it is a tenth.
+        // With the filters of today it is a tenth.
         assert!(ate_m < unfiltered_m / 3.0, "{method}: {ate_m} m of {unfiltered_m} m");
     }
 }
 
-/// The cameras of EuRoC at half their size, and the right one in the left: turned by some degrees, as mounted cameras are.
+/// The cameras of EuRoC at half their size with their poses relative to the left one, turned by some degrees as real cameras are.
 fn euroc_cameras() -> [(Camera, Isometry3<f64>); 2] {
     let camera = |f: f64, cx: f64, cy: f64, k1: f64, k2: f64| Camera {
         width: 376,
@@ -97,12 +97,12 @@ fn euroc_cameras() -> [(Camera, Isometry3<f64>); 2] {
     ]
 }
 
-fn grey(picture: &RgbImage) -> Image<u8> {
+fn grey(image: &RgbImage) -> Image<u8> {
     let grey = |[r, g, b]: &[u8; 3]| ((u16::from(*r) + 2 * u16::from(*g) + u16::from(*b)) / 4) as u8;
-    Image::from_vec(picture.width(), picture.height(), picture.data().iter().map(grey).collect()).unwrap()
+    Image::from_vec(image.width(), image.height(), image.data().iter().map(grey).collect()).unwrap()
 }
 
-/// Writes [`ROOM`] as EuRoC has its sequences: grey, distorted, with the truth of a body that is not the camera.
+/// Writes [`ROOM`] in the layout of EuRoC: grey, distorted, with the ground truth of a body that is not the camera.
 fn write_euroc(folder: &Path) {
     let world = world(ROOM);
     let t_body_left = Isometry3::new(Vector3::new(-0.0216, -0.0647, 0.0098), Vector3::new(0.1, -0.2, 1.5));
@@ -150,7 +150,7 @@ fn write_euroc(folder: &Path) {
 }
 
 #[test]
-fn a_euroc_folder_is_rectified_and_judged_by_the_truth_of_its_body() {
+fn a_euroc_folder_is_rectified_and_evaluated_with_the_ground_truth_of_its_body() {
     let folder = tempfile::tempdir().unwrap();
     write_euroc(&folder.path().join("MH"));
     let info = succeeds(folder.path(), &["info", "MH"]).stdout;
@@ -168,7 +168,7 @@ fn a_euroc_folder_is_rectified_and_judged_by_the_truth_of_its_body() {
 }
 
 #[test]
-fn a_kitti_folder_is_judged_by_the_poses_of_camera_0() {
+fn a_kitti_folder_is_evaluated_with_the_poses_of_camera_0() {
     let folder = tempfile::tempdir().unwrap();
     let sequence = folder.path().join("sequences/07");
     let world = world(&format!("{ROOM}&stereo=0.2"));
@@ -177,10 +177,10 @@ fn a_kitti_folder_is_judged_by_the_poses_of_camera_0() {
     let t_cam0_cam2 = Isometry3::translation(-0.06, 0.0, 0.0);
     for index in 0..world.len() {
         let shot = world.frame(index).frame;
-        for (camera, picture) in [(2, &shot.color), (3, shot.right.as_ref().unwrap())] {
+        for (camera, image) in [(2, &shot.color), (3, shot.right.as_ref().unwrap())] {
             let of_camera = sequence.join(format!("image_{camera}"));
             fs::create_dir_all(&of_camera).unwrap();
-            write_color_png(&of_camera.join(format!("{index:06}.png")), picture).unwrap();
+            write_color_png(&of_camera.join(format!("{index:06}.png")), image).unwrap();
         }
         writeln!(times, "{:.6e}", world.timestamp_ns(index) as f64 * 1e-9).unwrap();
         let pose = (world.pose(index) * t_cam0_cam2.inverse()).to_homogeneous().transpose();
@@ -194,14 +194,14 @@ fn a_kitti_folder_is_judged_by_the_poses_of_camera_0() {
     fs::write(sequence.join("times.txt"), times).unwrap();
     fs::write(sequence.join("calib.txt"), calib).unwrap();
     fs::write(folder.path().join("poses.txt"), &poses).unwrap();
-    let judged_by = ["--method", "none", "--groundtruth", "poses.txt"];
-    let report = tracked(folder.path(), "sequences/07", &judged_by);
+    let evaluated_with = ["--method", "none", "--groundtruth", "poses.txt"];
+    let report = tracked(folder.path(), "sequences/07", &evaluated_with);
     assert!(ate_rmse(&report) < MAX_ATE_M);
     let bf = report["camera"]["bf"].as_f64().unwrap();
     assert!((bf / c.bf - 1.0).abs() < 1e-9, "{bf}");
     let info = succeeds(folder.path(), &["info", "sequences/07"]).stdout;
     assert!(info.contains("KITTI odometry, stereo"), "{info}");
-    // Where the benchmark puts them they are found.
+    // In the folder of the benchmark they are found without an option.
     fs::create_dir(folder.path().join("poses")).unwrap();
     fs::write(folder.path().join("poses/07.txt"), &poses).unwrap();
     assert!(ate_rmse(&tracked(folder.path(), "sequences/07", &["--method", "none"])) < MAX_ATE_M);

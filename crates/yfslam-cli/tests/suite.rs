@@ -1,4 +1,4 @@
-//! The standing suite in short forms: every world is tracked by the default method, and to the same figures on every run.
+//! The suite in short forms: every world is tracked by the default method, with the same results on every run.
 //! `yfslam bench --seeds 5` is the long form.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
@@ -12,14 +12,14 @@ use serde_json::Value;
 
 /// Half the size.
 const SMALL: &str = "width=320&height=240";
-/// Eight seconds: long enough for people to lead a camera astray.
+/// Eight seconds: long enough for a large error without a filter.
 const LONG_FRAMES: &str = "240";
-/// Worlds with too little texture, or too fast a camera, for the half.
+/// Worlds with too little texture or too fast a camera for half the size.
 const WHOLE: [&str; 2] = ["dark_rescue", "corridor_loop"];
-/// Two seconds of a world in a few seconds: every second frame is left out, and what moves goes twice as far between two.
+/// Two seconds of a world with every second frame: motion between two frames is twice as large.
 const SHORT: (&str, &str) = ("fps=15", "30");
 
-/// The cells of the named worlds, in the order of their file names.
+/// Returns the cells of the named worlds, in the order of their file names.
 fn cells(folder: &Path, names: &[&str], out: &str) -> Vec<Value> {
     let (rate, frames) = SHORT;
     let form = |name: &str| if WHOLE.contains(&name) { rate.to_owned() } else { format!("{rate}&{SMALL}") };
@@ -27,7 +27,7 @@ fn cells(folder: &Path, names: &[&str], out: &str) -> Vec<Value> {
     bench(folder, &specs, "yf", frames, out)
 }
 
-/// The cells of the worlds, methods in alphabetical order for each.
+/// Returns the cells of the worlds, with the methods of each in alphabetical order.
 fn bench(folder: &Path, specs: &[String], methods: &str, frames: &str, out: &str) -> Vec<Value> {
     let mut args =
         vec!["bench", "--methods", methods, "--seeds", "1", "--frames", frames, "--jobs", "2", "--out", out, "-q"];
@@ -38,7 +38,7 @@ fn bench(folder: &Path, specs: &[String], methods: &str, frames: &str, out: &str
     paths.iter().map(|path| serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()).collect()
 }
 
-/// Error of `none` and of `yf` in the motions of an activity, in a form of so many frames, with its name.
+/// Returns the errors of `none` and of `yf` for the camera motions of an activity.
 fn errors(folder: &Path, activity: &str, form: &str, frames: &str) -> Vec<(String, f64, f64)> {
     let names: Vec<String> = ["static", "xyz", "rpy", "halfsphere"].map(|motion| format!("{activity}_{motion}")).into();
     let specs: Vec<String> = names.iter().map(|name| format!("{name}?{form}")).collect();
@@ -52,7 +52,7 @@ fn errors(folder: &Path, activity: &str, form: &str, frames: &str) -> Vec<(Strin
     names.iter().map(|name| (name.clone(), error(name, "none"), error(name, "yf"))).collect()
 }
 
-/// Those of the cells that are not within 5 cm in nine frames of ten.
+/// Returns the cells with an error above 5 cm or less than nine tenths of the frames tracked.
 fn poor(cells: &[Value]) -> Vec<&Value> {
     let good = |cell: &Value| {
         let holds = |key: &str, is_good: fn(f64) -> bool| cell[key].as_f64().is_some_and(is_good);
@@ -71,7 +71,7 @@ fn worlds_are_tracked_within_5_cm_in_nine_frames_of_ten() {
 }
 
 #[test]
-fn without_a_filter_walkers_lead_the_camera_astray_by_20_cm_or_ten_times_as_far_as_with_it() {
+fn without_a_filter_walking_people_cause_20_cm_or_ten_times_the_error_with_it() {
     let folder = tempfile::tempdir().unwrap();
     for (name, none, yf) in errors(folder.path(), "walking", SMALL, LONG_FRAMES) {
         assert!(none > 0.2 || none >= 10.0 * yf, "{name}: none {none} m, yf {yf} m");
@@ -80,16 +80,16 @@ fn without_a_filter_walkers_lead_the_camera_astray_by_20_cm_or_ten_times_as_far_
 }
 
 #[test]
-fn where_people_sit_the_filter_makes_a_difference_of_2_mm_at_most_or_a_tenth() {
+fn where_people_sit_the_filter_changes_the_error_by_2_mm_at_most_or_a_tenth() {
     let folder = tempfile::tempdir().unwrap();
-    // At half the size both err by 1 cm and more, and the difference is chance.
+    // At half the size both errors exceed 1 cm, and their difference is random.
     for (name, none, yf) in errors(folder.path(), "sitting", "", "120") {
         assert!((none - yf).abs() <= (0.1 * none).max(0.002), "{name}: none {none} m, yf {yf} m");
     }
 }
 
 #[test]
-fn a_world_gives_the_same_figures_on_every_run() {
+fn a_world_gives_the_same_results_on_every_run() {
     let folder = tempfile::tempdir().unwrap();
     let figures = |out: &str| -> Vec<[Value; 4]> {
         let names = ["walking_rpy", "crowd"];

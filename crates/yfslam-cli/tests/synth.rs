@@ -1,4 +1,4 @@
-//! `yfslam synth`: what it writes is what the world in process shows.
+//! `yfslam synth`: the written recording equals the rendered world.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 mod common;
@@ -19,7 +19,7 @@ fn same_trajectory(a: &Path, b: &Path) {
 }
 
 #[test]
-fn a_written_world_is_tracked_to_the_same_bits_as_the_world_in_process_boxes_and_lens_included() {
+fn a_written_world_is_tracked_to_the_same_bits_as_the_rendered_one_also_with_boxes_and_distortion() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     let (world, camera) = (format!("synth:{WORLD}"), ["--camera", "tum1"]);
@@ -38,7 +38,7 @@ fn a_written_world_is_tracked_to_the_same_bits_as_the_world_in_process_boxes_and
 }
 
 #[test]
-fn boxes_masks_settings_and_lists_are_those_of_the_world() {
+fn boxes_masks_settings_and_lists_equal_those_of_the_world() {
     let folder = tempfile::tempdir().unwrap();
     let rec = folder.path().join("rec");
     succeeds(folder.path(), &["synth", WORLD, "--out", "rec", "-q"]);
@@ -102,7 +102,7 @@ fn a_carried_laptop_has_its_name_its_box_and_its_mask() {
 }
 
 #[test]
-fn a_folder_in_use_is_left_alone_unless_it_is_a_recording_and_may_be_replaced() {
+fn an_existing_folder_is_only_replaced_if_it_is_a_recording_and_force_is_given() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     let small = "walking_static?people=0&width=64&height=48&frames=3";
@@ -123,7 +123,7 @@ fn a_folder_in_use_is_left_alone_unless_it_is_a_recording_and_may_be_replaced() 
 }
 
 #[test]
-fn the_list_tells_every_name_and_each_can_be_rendered() {
+fn the_list_has_every_name_and_each_world_can_be_rendered() {
     let folder = tempfile::tempdir().unwrap();
     let text = succeeds(folder.path(), &["synth", "--list"]).stdout;
     assert_eq!(text.lines().count(), yfslam_synth::SUITE.len());

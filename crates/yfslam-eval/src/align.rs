@@ -137,7 +137,7 @@ fn position(pose: &StampedPose) -> Vector3<f64> {
 }
 
 /// Returns Horn's symmetric matrix N, whose quadratic form in a unit quaternion (w, x, y, z) is Σ r · R e, from S = Σ e rᵀ.
-pub(crate) fn horn_matrix(s: &Matrix3<f64>) -> Matrix4<f64> {
+pub fn horn_matrix(s: &Matrix3<f64>) -> Matrix4<f64> {
     let (sxx, sxy, sxz) = (s.m11, s.m12, s.m13);
     let (syx, syy, syz) = (s.m21, s.m22, s.m23);
     let (szx, szy, szz) = (s.m31, s.m32, s.m33);

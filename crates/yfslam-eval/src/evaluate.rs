@@ -1,8 +1,7 @@
-//! In: two trajectories and what to measure. Out: every figure of one run, and its table.
+//! In: two trajectories and what to measure. Out: every figure of one run.
 
 use crate::{
-    AlignmentKind, Ate, Coverage, DEFAULT_MAX_DIFF_NS, EvalError, Rpe, RpeOptions, StampedPose, Statistics, Table,
-    TableStyle, associate, ate, rpe,
+    AlignmentKind, Ate, Coverage, DEFAULT_MAX_DIFF_NS, EvalError, Rpe, RpeOptions, StampedPose, associate, ate, rpe,
 };
 use serde::{Deserialize, Serialize};
 
@@ -90,38 +89,4 @@ pub fn evaluate(
         rpe: options.rpe.iter().map(|o| rpe(&scaled, o)).collect::<Result<_, _>>()?,
         coverage,
     })
-}
-
-impl Evaluation {
-    /// The figures as a table with a line below that says how the poses were matched and how much was tracked.
-    ///
-    /// Four decimals: 0.1 mm is the resolution of the usual ground truth.
-    pub fn table(&self, style: TableStyle) -> String {
-        let mut table = Table::new(["error", "RMSE", "mean", "median", "S.D.", "min", "max", "n"]);
-        let mut push = |name: String, s: &Statistics| {
-            let figures = [s.rmse, s.mean, s.median, s.std, s.min, s.max].map(|v| format!("{v:.4}"));
-            table.push([name].into_iter().chain(figures).chain([s.count.to_string()]));
-        };
-        push(format!("ATE, {} (m)", self.ate.alignment.kind), &self.ate.translation_m);
-        for rpe in &self.rpe {
-            let pairs = if rpe.options.all_pairs { "all pairs" } else { "consecutive" };
-            push(format!("RPE per {}, {pairs} (m)", rpe.options.delta), &rpe.translation_m);
-            push(format!("RPE per {}, {pairs} (deg)", rpe.options.delta), &rpe.rotation_deg);
-        }
-        let mut text = table.render(style);
-        text += &format!(
-            "\n{} matches of {} estimated and {} reference poses within {} ms",
-            self.matches,
-            self.estimate_poses,
-            self.reference_poses,
-            self.max_diff_ns as f64 / 1e6
-        );
-        if self.ate.alignment.kind == AlignmentKind::Sim3 {
-            text += &format!("; {}", self.ate.alignment);
-        }
-        if let Some(c) = &self.coverage {
-            text += &format!("; tracked {} of {} frames ({:.1} %)", c.tracked, c.expected, 100.0 * c.fraction);
-        }
-        text + "\n"
-    }
 }

@@ -1,8 +1,8 @@
-//! Accuracy of an estimated trajectory against a reference: ATE, RPE, tracked fraction, improvement, tables.
+//! Accuracy of an estimated trajectory against a reference: ATE, RPE, tracked fraction, improvement.
 //!
 //! ```text
 //! reference ─┐                    ┌─ ate ── align (SE(3), Sim(3)) ─┐
-//!            ├─ associate ─ Match ┤                                ├─ Statistics ─ table
+//!            ├─ associate ─ Match ┤                                ├─ Statistics
 //! estimate ──┘                    └─ rpe ── pairs (frames, s, m) ──┘
 //! ```
 //!
@@ -17,12 +17,10 @@ mod error;
 mod evaluate;
 mod pose;
 mod published;
-pub mod report;
 mod rpe;
 mod statistics;
-mod table;
 
-pub use align::{Alignment, AlignmentKind, Ate, align, ate};
+pub use align::{Alignment, AlignmentKind, Ate, align, ate, horn_matrix};
 pub use associate::{DEFAULT_MAX_DIFF_NS, Match, associate};
 pub use coverage::Coverage;
 pub use error::{EvalError, Trajectory};
@@ -31,7 +29,6 @@ pub use pose::StampedPose;
 pub use published::{Measure, Published, published};
 pub use rpe::{Delta, Rpe, RpeOptions, rpe};
 pub use statistics::{Statistics, improvement_percent};
-pub use table::{Table, TableStyle};
 
 /// The example of the README.
 #[cfg(doctest)]

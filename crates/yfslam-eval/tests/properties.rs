@@ -5,8 +5,8 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use yfslam_eval::{
-    AlignmentKind, Delta, EvalError, EvalOptions, ExpectedFrames, Match, RpeOptions, StampedPose, TableStyle, align,
-    associate, ate, evaluate, rpe,
+    AlignmentKind, Delta, EvalError, EvalOptions, ExpectedFrames, Match, RpeOptions, StampedPose, align, associate,
+    ate, evaluate, rpe,
 };
 
 const FRAME_NS: i64 = 100_000_000;
@@ -223,25 +223,15 @@ fn a_span_that_does_not_occur_or_is_out_of_range_is_refused() {
 }
 
 #[test]
-fn an_evaluation_is_the_same_after_json_and_is_printed_as_a_table() {
+fn an_evaluation_survives_json() {
     let reference = curve(40);
     let expected = ExpectedFrames::StampsNs(reference.iter().map(|p| p.timestamp_ns).collect());
     let options = EvalOptions { alignment: AlignmentKind::Sim3, expected, ..EvalOptions::default() };
     let estimate = transformed(&reference[..30], 0.5, &Isometry3::identity());
     let evaluation = evaluate(&reference, &estimate, &options).unwrap();
     let json = serde_json::to_string(&evaluation).unwrap();
-    assert_eq!(
-        serde_json::from_str::<yfslam_eval::Evaluation>(&json).unwrap().table(TableStyle::Plain),
-        evaluation.table(TableStyle::Plain)
-    );
-
-    let text = evaluation.table(TableStyle::Plain);
-    let (header, ate) = (text.lines().next().unwrap(), text.lines().nth(2).unwrap());
-    assert_eq!(
-        header.split_whitespace().collect::<Vec<_>>(),
-        ["error", "RMSE", "mean", "median", "S.D.", "min", "max", "n"]
-    );
-    assert!(ate.starts_with("ATE, Sim(3) (m)  ") && ate.ends_with("  0.0000   30"), "{text}");
-    assert!(text.ends_with("within 10 ms; Sim(3), scale s = 2.0000; tracked 30 of 40 frames (75.0 %)\n"), "{text}");
-    assert!(evaluation.table(TableStyle::Markdown).starts_with("| error "));
+    let again = serde_json::from_str::<yfslam_eval::Evaluation>(&json).unwrap();
+    // Decimal numbers may differ in the last bit.
+    assert_eq!((again.matches, again.coverage), (evaluation.matches, evaluation.coverage));
+    assert!((again.ate.alignment.scale - 2.0).abs() < 1e-9 && again.rpe.len() == evaluation.rpe.len());
 }

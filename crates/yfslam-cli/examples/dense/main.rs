@@ -17,7 +17,7 @@ use survey::{Taken, Way, take};
 use thickness::thickness;
 use yfslam::dense::{DenseConfig, up};
 use yfslam::dynamic::Method;
-use yfslam_eval::{Table, TableStyle};
+use yfslam_report::{Table, TableStyle};
 use yfslam_synth::{World, parse};
 
 #[derive(Parser)]

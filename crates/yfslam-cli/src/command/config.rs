@@ -1,24 +1,24 @@
-//! `yfslam config`: every constant of the system with its meaning.
+//! `yfslam config`: the configuration with the meaning of each key.
 
 use anyhow::Result;
 use clap::Args;
 
-use crate::settings::{MethodArg, SettingsArgs};
-use crate::terminal::print;
+use crate::input::settings::{MethodArg, SettingsArgs};
+use crate::ui::terminal::print;
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
-  yfslam config > yfslam.toml         change what you like, delete the rest
-  yfslam run DIR --config yfslam.toml
-  yfslam config --config yfslam.toml  see what a file amounts to";
+  yfslam config > yfslam.toml    prints all settings; change some, and delete the rest
+  yfslam run DIR -c yfslam.toml
+  yfslam config -c yfslam.toml   prints all settings as the file changes them";
 
 /// Print the configuration, each key with its meaning, unit and source.
 ///
-/// Without options these are the defaults; with options, what they amount to.
+/// Without options, these are the defaults.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = HELP)]
 pub struct ConfigArgs {
-    /// How moving things are kept out [default: full].
+    /// Method for dynamic scenes [default: full].
     #[arg(long, value_enum, value_name = "METHOD", help_heading = "System")]
     method: Option<MethodArg>,
     #[command(flatten)]

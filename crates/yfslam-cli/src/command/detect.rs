@@ -1,4 +1,4 @@
-//! `yfslam detect`: images in, the boxes that the network finds in them out.
+//! `yfslam detect`: detections in images.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -11,107 +11,106 @@ use yfslam_detect::DetectorConfig;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
 
-use crate::apart::Apart;
-use crate::detector::{self, DetectorArgs, LoadedDetector};
-use crate::found::{FoundBox, FoundIn, FoundList, Look};
-use crate::output::OutputFolder;
-use crate::overlay;
-use crate::pipeline::StageSummary;
-use crate::progress::Progress;
-use crate::terminal::{Terminal, explain};
+use crate::input::detector::{self, DetectorArgs, LoadedDetector};
+use crate::input::instance_detector::InstanceDetector;
+use crate::output::detections_file::{DetectionsFile, ImageDetections, ImageResult, ObjectBox};
+use crate::output::folder::{OutputFolder, remove_files};
+use crate::stats::stages::StageSummary;
+use crate::ui::progress::Progress;
+use crate::ui::terminal::{Terminal, explain};
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
-  yfslam detect photo.jpg --pictures
-  yfslam detect rgbd_bonn_crowd/rgb --score 0.5 --out crowd
+  yfslam detect photo.jpg --images
+  yfslam detect rgbd_bonn_crowd/rgb --score 0.5 -o crowd
   yfslam detect images/ --detector yolo-fastestv2.onnx --class person,chair
-  yfslam detect images/ --roll 90      taken by a camera that lay on its right side
+  yfslam detect images/ --roll 90      images of a camera that lay on its right side
 
-In the output folder:
-  boxes.json   each image, a line: its boxes with class, score, and left, top, right and bottom edge in px; from a network that
-               segments also the mask in COCO's form: size [height, width] and counts, the lengths of runs down the columns, of
-               pixels beside and of the object in turns
-  pictures/    with --pictures, each image with its boxes and masks; the bar in a box is as long as its score
+Files in the output folder:
+  boxes.json   one line for each image: class, score and bounding box (left, top, right, bottom, px) of each object; from a network
+               that segments also its mask as COCO's run-length encoding, column by column
+  images/      with --images, each image with boxes and masks; the bar in a box shows the score
 
-Ends with success only if every image could be read; of the others boxes are written all the same.";
+Exit status:
+  Success if every image could be read. Otherwise the boxes of the other images are written.";
 
-/// Kinds of file that are taken from a folder.
-const KINDS: [&str; 3] = ["png", "jpg", "jpeg"];
-/// Up to so many images are told one by one.
-const TOLD: usize = 20;
+/// Extensions of the files that are read from a folder.
+const EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+/// Largest number of images whose detections are printed one by one.
+const MAX_PRINTED: usize = 20;
 
-/// Find people in images: boxes as JSON and as pictures.
+/// Detect people in images; writes bounding boxes as JSON, and images with boxes.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = HELP)]
 pub struct DetectArgs {
-    /// Images, PNG or JPEG, and folders of them.
+    /// Images in PNG or JPEG format, and folders of images.
     #[arg(value_name = "IMAGE|FOLDER", required = true)]
     paths: Vec<PathBuf>,
     #[command(flatten)]
     detector: DetectorArgs,
-    /// Least score of a box, between 0 and 1.
+    /// Lowest score of a box, between 0 and 1.
     #[arg(long, value_name = "SCORE", default_value_t = 0.3, allow_negative_numbers = true, help_heading = "System")]
     score: f32,
-    /// Of two boxes of one class that overlap by more than this (intersection over union), only the better one is kept.
+    /// Intersection over union above which only the better of two boxes of a class is kept.
     #[arg(long, value_name = "SHARE", default_value_t = 0.5, allow_negative_numbers = true, help_heading = "System")]
     iou: f32,
-    /// Report these classes alone [default: all that the network knows].
+    /// Report only these classes [default: all classes of the network].
     #[arg(long = "class", value_name = "NAME,NAME", value_delimiter = ',', help_heading = "System")]
     classes: Vec<String>,
-    /// How far the camera was rolled clockwise, degrees: boxes are found in the images turned upright.
+    /// Clockwise roll of the camera, degrees; images are turned upright for the detector.
     #[arg(long, value_name = "DEGREES", default_value_t = 0, allow_negative_numbers = true, help_heading = "System")]
     #[arg(value_parser = clap::value_parser!(i32).range(-180..=180))]
     roll: i32,
-    /// Where results go.
-    #[arg(long, value_name = "DIR", default_value = "yfslam-out/detect", help_heading = "Output")]
+    /// Output folder.
+    #[arg(short, long, value_name = "DIR", default_value = "yfslam-out/detect", help_heading = "Output")]
     out: PathBuf,
     /// Write each image with its boxes.
-    #[arg(long, help_heading = "Output")]
-    pictures: bool,
+    #[arg(long, alias = "pictures", help_heading = "Output")]
+    images: bool,
 }
 
 pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
     let files = args.files()?;
     let config = DetectorConfig { score_threshold: args.score, iou_threshold: args.iou, ..Default::default() };
     let LoadedDetector { detector, times, identity } = detector::load(&args.detector, config)?;
-    let mut detector = Apart::new(detector);
-    let known = detector.known().to_vec();
-    if let Some(unknown) = args.classes.iter().find(|class| !known.contains(class)) {
-        bail!("the network does not know the class '{unknown}' (--class); it knows: {}", known.join(", "));
+    let mut detector = InstanceDetector::new(detector);
+    let class_names = detector.network_classes().to_vec();
+    if let Some(unknown) = args.classes.iter().find(|class| !class_names.contains(class)) {
+        bail!("the network does not have the class '{unknown}' (--class); its classes are: {}", class_names.join(", "));
     }
     let out = OutputFolder::prepare(Some(&args.out), "detect")?;
-    let pictures = args.pictures.then(|| pictures(&out)).transpose()?;
+    let images = args.images.then(|| image_folder(&out)).transpose()?;
     let wanted = |class: &&str| args.classes.is_empty() || args.classes.iter().any(|asked| asked == class);
-    let mut list = FoundList {
+    let mut list = DetectionsFile {
         yfslam: env!("CARGO_PKG_VERSION"),
         model: &identity,
         score_threshold: args.score,
-        classes: known.iter().map(String::as_str).filter(wanted).collect(),
+        classes: class_names.iter().map(String::as_str).filter(wanted).collect(),
         images: Vec::new(),
     };
     let mut progress = Progress::new(terminal, "detect", files.len());
     let mut upright = Upright::default();
     for (index, file) in files.iter().enumerate() {
-        let look = match look(file, &mut detector, &mut upright, args.roll) {
+        let result = match detect(file, &mut detector, &mut upright, args.roll) {
             Ok((image, detections)) => {
                 let mask = upright.mask(&detector);
                 let of = |d: Detection| {
                     let class = detector.class_names().get(d.class).map(String::as_str).filter(wanted)?;
-                    Some(FoundBox::new(d, class, mask))
+                    Some(ObjectBox::new(d, class, mask))
                 };
-                let boxes: Vec<FoundBox> = detections.into_iter().filter_map(of).collect();
-                if let Some(folder) = &pictures {
+                let boxes: Vec<ObjectBox> = detections.into_iter().filter_map(of).collect();
+                if let Some(folder) = &images {
                     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
                     write_color_png(&folder.join(format!("{index:06}-{stem}.png")), &list.draw(&image, &boxes))?;
                 }
-                Look::Seen { width: image.width(), height: image.height(), boxes }
+                ImageResult::Detected { width: image.width(), height: image.height(), boxes }
             }
-            Err(error) => Look::Unread { error: explain(&error) },
+            Err(error) => ImageResult::Unreadable { error: explain(&error) },
         };
-        let found = FoundIn { file: file.display().to_string(), look };
-        if matches!(found.look, Look::Unread { .. }) {
+        let found = ImageDetections { file: file.display().to_string(), result };
+        if found.is_unreadable() {
             terminal.warn(&found.to_string());
-        } else if files.len() <= TOLD {
+        } else if files.len() <= MAX_PRINTED {
             terminal.result(&format!("{found}\n"))?;
         }
         list.images.push(found);
@@ -122,28 +121,28 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
     let took: Vec<Duration> = times.try_iter().map(|took| took.wall).collect();
     let median = StageSummary::of(&took).map_or(String::new(), |s| format!("; {:.2} ms an image", s.median_ms));
     terminal.result(&format!(
-        "{}, by the {identity}{median}\nwritten to {}\n",
+        "{}, with the {identity}{median}\nwritten to {}\n",
         list.summary(),
         out.path().display()
     ))?;
-    let unread = list.images.iter().filter(|image| matches!(image.look, Look::Unread { .. })).count();
+    let unreadable = list.images.iter().filter(|image| image.is_unreadable()).count();
     ensure!(
-        unread == 0,
-        "{unread} of {} images could not be read; see the warnings, or `error` in boxes.json",
+        unreadable == 0,
+        "{unreadable} of {} images could not be read; see the warnings, or `error` in boxes.json",
         files.len()
     );
     Ok(())
 }
 
 impl DetectArgs {
-    /// The images, folders replaced by what they hold, in the order of names.
+    /// Returns the images; folders are replaced by their images in the order of names.
     fn files(&self) -> Result<Vec<PathBuf>> {
         let mut files = Vec::new();
         for path in &self.paths {
             if path.is_dir() {
                 files.extend(images_in(path)?);
             } else {
-                ensure!(path.exists(), "there is no {}; check the path", path.display());
+                ensure!(path.exists(), "{} does not exist; check the path", path.display());
                 files.push(path.clone());
             }
         }
@@ -154,8 +153,8 @@ impl DetectArgs {
 fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let cannot = || format!("cannot read the folder {}", folder.display());
     let is_image = |path: &PathBuf| {
-        let kind = path.extension().map(|kind| kind.to_string_lossy().to_ascii_lowercase());
-        path.is_file() && kind.is_some_and(|kind| KINDS.contains(&kind.as_str()))
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+        path.is_file() && extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()))
     };
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(cannot)? {
@@ -168,20 +167,25 @@ fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
         colour if colour.is_dir() => {
             bail!("{} holds no images; did you mean {}?", folder.display(), colour.display())
         }
-        _ => bail!("{} holds no images: files named .png, .jpg or .jpeg", folder.display()),
+        _ => bail!("{} holds no images, which are files named .png, .jpg or .jpeg", folder.display()),
     }
 }
 
-/// The folder for pictures, without those of an earlier run.
-fn pictures(out: &OutputFolder) -> Result<PathBuf> {
-    let folder = out.path().join("pictures");
+/// Returns the folder for images; removes the images of an earlier run.
+fn image_folder(out: &OutputFolder) -> Result<PathBuf> {
+    let folder = out.path().join("images");
     let is_ours = |name: &str| name.ends_with(".png") && name.bytes().take_while(u8::is_ascii_digit).count() >= 6;
-    overlay::remove_pictures(&folder, is_ours)?;
+    remove_files(&folder, is_ours)?;
     Ok(folder)
 }
 
-/// Reads an image and finds boxes in it, where the camera was rolled by `roll_deg`.
-fn look(file: &Path, detector: &mut Apart, upright: &mut Upright, roll_deg: i32) -> Result<(RgbImage, Vec<Detection>)> {
+/// Reads an image and detects objects in it; the camera was rolled by `roll_deg`.
+fn detect(
+    file: &Path,
+    detector: &mut InstanceDetector,
+    upright: &mut Upright,
+    roll_deg: i32,
+) -> Result<(RgbImage, Vec<Detection>)> {
     let bytes = std::fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
     let (mut image, mut found) = (RgbImage::default(), Vec::new());
     decode_color(&bytes, None, &mut image).map_err(|error| anyhow!("{} {error}", file.display()))?;

@@ -1,4 +1,4 @@
-//! `yfslam eval`: how far an estimated trajectory is from the truth.
+//! `yfslam eval`: compares an estimated trajectory with the ground truth.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -6,40 +6,44 @@ use std::str::FromStr;
 use anyhow::{Context, Result};
 use clap::Args;
 use serde::Serialize;
-use yfslam_eval::{
-    Delta, EvalOptions, Evaluation, RpeOptions, Statistics, Table, TableStyle, evaluate, improvement_percent,
-};
+use yfslam_eval::{Delta, EvalOptions, Evaluation, RpeOptions, Statistics, evaluate, improvement_percent};
+use yfslam_report::{Table, TableStyle, evaluation_table};
 
-use crate::accuracy::{MatchArgs, judge, read_poses, to_eval};
-use crate::terminal::{Terminal, print};
+use crate::input::trajectory::read_poses;
+use crate::run::evaluation::{EvaluationArgs, evaluate_possible};
+use crate::ui::terminal::{Terminal, print};
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
   yfslam eval groundtruth.txt yfslam-out/walk/trajectory.txt
-  yfslam eval groundtruth.txt yf.txt --versus none.txt             how much better, equation 3 of the YF-SLAM paper
+  yfslam eval groundtruth.txt yf.txt --versus none.txt       improvement, equation 3 of the YF-SLAM paper
   yfslam eval groundtruth.txt live.txt --delta 1f --delta 0.5m --json
-  yfslam eval groundtruth.txt mono.txt --align sim3";
+  yfslam eval groundtruth.txt mono.txt --align sim3
 
-/// Compare an estimated trajectory with the truth: absolute (ATE) and relative (RPE) error.
-///
-/// All files in TUM format: `t tx ty tz qx qy qz qw`, world from camera. The figures are those of the tools of the TUM benchmark and
-/// of `evo`.
+File format:
+  TUM: `t tx ty tz qx qy qz qw` in each line, world from camera.
+
+Other tools:
+  The errors equal those of the tools of the TUM RGB-D benchmark and of evo. For --max-difference-ms, the former use 20, the latter 10;
+  the ground truth of Bonn needs 20. `yfslam ape` and `yfslam rpe` take the options of evo.";
+
+/// Compute the absolute (ATE) and relative (RPE) error of an estimated trajectory.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = HELP)]
 pub struct EvalArgs {
-    /// The true trajectory.
+    /// Ground truth in TUM format.
     groundtruth: PathBuf,
-    /// The trajectory to judge.
+    /// Estimated trajectory in TUM format.
     estimate: PathBuf,
-    /// Another estimate, and how much better the first one is.
+    /// Another estimate; the improvement of the first one over it is printed.
     #[arg(long, value_name = "OTHER")]
     versus: Option<PathBuf>,
     #[command(flatten)]
-    matching: MatchArgs,
-    /// Span of the relative error: frames (1f), seconds (1s) or metres (0.5m); may be given several times [default: 1f 1s].
-    #[arg(long, value_name = "SPAN", help_heading = "Evaluation")]
-    delta: Vec<Span>,
-    /// Start a span at every pose, not where the last one ended. Spans in seconds always do.
+    evaluation: EvaluationArgs,
+    /// Interval of the relative error in frames (1f), seconds (1s) or metres (0.5m); can be given several times [default: 1f 1s].
+    #[arg(long, value_name = "INTERVAL", help_heading = "Evaluation")]
+    delta: Vec<Interval>,
+    /// Start an interval at every pose and not only where the last one ended; intervals in seconds always do.
     #[arg(long, help_heading = "Evaluation")]
     all_pairs: bool,
     /// Print JSON instead of tables.
@@ -47,15 +51,15 @@ pub struct EvalArgs {
     json: bool,
 }
 
-/// A span as the user writes it.
+/// An interval as the user writes it.
 #[derive(Clone, Copy, Debug)]
-struct Span(Delta);
+struct Interval(Delta);
 
-impl FromStr for Span {
+impl FromStr for Interval {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let refuse = || format!("'{text}' is no span; write frames as 1f, seconds as 1s, metres as 0.5m");
+        let refuse = || format!("'{text}' is not an interval; write frames as 1f, seconds as 1s, metres as 0.5m");
         let (number, unit) = text.split_at_checked(text.len().saturating_sub(1)).ok_or_else(refuse)?;
         let positive = || number.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(refuse);
         Ok(Self(match unit {
@@ -67,8 +71,8 @@ impl FromStr for Span {
     }
 }
 
-impl Span {
-    /// Pairs of this span, as the defaults choose them.
+impl Interval {
+    /// Returns the options with the default choice of pairs.
     fn options(self) -> RpeOptions {
         match self.0 {
             Delta::Seconds(_) => RpeOptions { delta: self.0, ..RpeOptions::per_second() },
@@ -77,7 +81,7 @@ impl Span {
     }
 }
 
-/// What is printed as JSON.
+/// The output as JSON.
 #[derive(Serialize)]
 struct Comparison {
     estimate: Evaluation,
@@ -87,7 +91,7 @@ struct Comparison {
     improvement_percent: Option<Vec<Improvement>>,
 }
 
-/// By how much the estimate is better than the other one, % (paper equation 3); `null` where that is undefined.
+/// Improvement of the estimate over the other one, % (equation 3 of the paper); `null` where it is undefined.
 #[derive(Serialize)]
 struct Improvement {
     error: String,
@@ -98,21 +102,21 @@ struct Improvement {
 }
 
 pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
-    let truth = to_eval(&read_poses(&args.groundtruth, terminal)?);
-    let max_diff_ns = args.matching.max_diff_ns()?;
-    let judged = |path: &Path| -> Result<Evaluation> {
-        let estimate = to_eval(&read_poses(path, terminal)?);
+    let truth = read_poses(&args.groundtruth, terminal)?;
+    let max_diff_ns = args.evaluation.max_diff_ns()?;
+    let evaluated = |path: &Path| -> Result<Evaluation> {
+        let estimate = read_poses(path, terminal)?;
         let options = options(args, max_diff_ns);
-        // A span that was asked for must be there; a default one may be missing.
+        // A requested interval must exist; a default one may be missing.
         let evaluation = if args.delta.is_empty() {
-            judge(&truth, &estimate, options)
+            evaluate_possible(&truth, &estimate, options)
         } else {
             evaluate(&truth, &estimate, &options)
         };
-        evaluation.with_context(|| format!("cannot judge {} by {}", path.display(), args.groundtruth.display()))
+        evaluation.with_context(|| format!("cannot evaluate {} against {}", path.display(), args.groundtruth.display()))
     };
-    let estimate = judged(&args.estimate)?;
-    let versus = args.versus.as_deref().map(judged).transpose()?;
+    let estimate = evaluated(&args.estimate)?;
+    let versus = args.versus.as_deref().map(evaluated).transpose()?;
     let improvement_percent = versus.as_ref().map(|versus| improvements(&estimate, versus));
     let comparison = Comparison { estimate, versus, improvement_percent };
     if args.json {
@@ -121,11 +125,11 @@ pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
     print(&text(args, &comparison))
 }
 
-/// What to measure.
+/// Returns which errors to compute.
 fn options(args: &EvalArgs, max_diff_ns: u64) -> EvalOptions {
-    let mut options = EvalOptions { max_diff_ns, alignment: args.matching.alignment(true), ..Default::default() };
+    let mut options = EvalOptions { max_diff_ns, alignment: args.evaluation.alignment(true), ..Default::default() };
     if !args.delta.is_empty() {
-        options.rpe = args.delta.iter().map(|span| span.options()).collect();
+        options.rpe = args.delta.iter().map(|interval| interval.options()).collect();
     }
     for rpe in &mut options.rpe {
         rpe.all_pairs |= args.all_pairs;
@@ -133,7 +137,7 @@ fn options(args: &EvalArgs, max_diff_ns: u64) -> EvalOptions {
     options
 }
 
-/// The errors of an evaluation by name, in the order of its table.
+/// Returns names and statistics of the errors, in the order of the table.
 fn errors(evaluation: &Evaluation) -> Vec<(String, Statistics)> {
     let mut errors = vec![("ATE (m)".to_owned(), evaluation.ate.translation_m)];
     for rpe in &evaluation.rpe {
@@ -162,7 +166,7 @@ fn text(args: &EvalArgs, comparison: &Comparison) -> String {
     let (Some(other), Some(versus), Some(improvements)) =
         (&args.versus, &comparison.versus, &comparison.improvement_percent)
     else {
-        return comparison.estimate.table(TableStyle::Plain);
+        return evaluation_table(&comparison.estimate, TableStyle::Plain);
     };
     let mut table = Table::new(["improvement (%)", "RMSE", "mean", "median", "S.D."]);
     for i in improvements {
@@ -172,9 +176,9 @@ fn text(args: &EvalArgs, comparison: &Comparison) -> String {
     format!(
         "{}\n{}\n{}\n{}\nimprovement of the first over the second, (1 - ours / other) · 100\n{}",
         args.estimate.display(),
-        comparison.estimate.table(TableStyle::Plain),
+        evaluation_table(&comparison.estimate, TableStyle::Plain),
         other.display(),
-        versus.table(TableStyle::Plain),
+        evaluation_table(versus, TableStyle::Plain),
         table.render(TableStyle::Plain)
     )
 }
@@ -184,12 +188,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn spans_are_read_with_their_unit_and_anything_else_is_refused() {
-        assert_eq!("1f".parse::<Span>().unwrap().0, Delta::Frames(1));
-        assert_eq!("2.5s".parse::<Span>().unwrap().0, Delta::Seconds(2.5));
-        assert_eq!("0.5m".parse::<Span>().unwrap().0, Delta::Metres(0.5));
+    fn intervals_are_read_with_their_unit_and_anything_else_is_refused() {
+        assert_eq!("1f".parse::<Interval>().unwrap().0, Delta::Frames(1));
+        assert_eq!("2.5s".parse::<Interval>().unwrap().0, Delta::Seconds(2.5));
+        assert_eq!("0.5m".parse::<Interval>().unwrap().0, Delta::Metres(0.5));
         for text in ["", "f", "1", "0f", "1.5f", "-1s", "nanm", "infs", "1é", "1 s s"] {
-            assert!(text.parse::<Span>().unwrap_err().contains(text), "{text}");
+            assert!(text.parse::<Interval>().unwrap_err().contains(text), "{text}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! `yfslam info`: what a sequence holds, before any tracking.
+//! `yfslam info`: describes a sequence.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -13,21 +13,21 @@ use yfslam_io::sequence::{AssociationReport, FrameEntry, Layout};
 use yfslam_io::time::{format_stamp, seconds};
 use yfslam_io::{CameraSource, DepthStatistics, Sequence};
 
-use crate::source::{SourceArgs, open_sequence, world_camera};
-use crate::terminal::{explain, print};
+use crate::input::source::{SourceArgs, open_sequence, world_camera};
+use crate::ui::terminal::{explain, print};
 
-/// Frames that are opened, evenly over the sequence.
+/// Number of frames that are opened, spread evenly over the sequence.
 const SAMPLES: usize = 20;
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
   yfslam info rgbd_dataset_freiburg1_xyz
   yfslam info DIR --camera bonn --association-tolerance 30
   yfslam info 'synth:walking_xyz?people=3'";
 
-/// Tell what a sequence holds: frames, rates, gaps, images, depth, camera, ground truth.
+/// Describe a sequence: frames, rates, gaps, images, depth, camera, ground truth.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = HELP)]
 pub struct InfoArgs {
     #[command(flatten)]
     source: SourceArgs,
@@ -52,7 +52,7 @@ fn recorded(args: &SourceArgs) -> Result<String> {
     if let Ok(camera) = &camera
         && let Some(masks) = args.mask_tally(&sequence, &camera.camera)?
     {
-        writeln!(text, "masks         {} of {} frames have one", masks.found, masks.found + masks.missing)?;
+        writeln!(text, "masks         {} of {} frames have a mask", masks.found, masks.found + masks.missing)?;
     }
     match sequence.ground_truth.path() {
         Some(path) => truth(&mut text, path, &sequence)?,
@@ -61,7 +61,7 @@ fn recorded(args: &SourceArgs) -> Result<String> {
     Ok(text)
 }
 
-/// The kind of camera.
+/// Returns the type of the camera.
 fn sensor(depth_source: DepthSource) -> &'static str {
     match depth_source {
         DepthSource::Image => "RGB-D",
@@ -77,20 +77,18 @@ fn lists(text: &mut String, sequence: &Sequence) -> Result<()> {
         _ if report.from_associations_file => {
             writeln!(text, "lists         associations.txt: {color_listed} pairs listed, {paired} usable")?;
         }
-        (_, DepthSource::Motion) => writeln!(text, "lists         {color_listed} pictures, {paired} usable")?,
+        (_, DepthSource::Motion) => writeln!(text, "lists         {color_listed} images, {paired} usable")?,
         (Layout::Tum, DepthSource::Image) => {
             writeln!(
                 text,
                 "lists         rgb.txt {color_listed}, depth.txt {paired_images_listed} images; {paired} pairs"
             )?;
         }
-        _ => {
-            writeln!(text, "lists         {color_listed} left, {paired_images_listed} right pictures; {paired} pairs")?
-        }
+        _ => writeln!(text, "lists         {color_listed} left, {paired_images_listed} right images; {paired} pairs")?,
     }
     for (count, what) in [
-        (report.color_unmatched, "colour images without companion in time"),
-        (report.paired_images_unmatched, "companions without colour image in time"),
+        (report.color_unmatched, "colour images without a depth or right image in time"),
+        (report.paired_images_unmatched, "depth or right images without a colour image in time"),
         (report.duplicates_skipped, "entries skipped: duplicate stamp"),
         (report.backward_skipped, "entries skipped: stamp runs backward"),
         (report.unstamped_skipped, "entries skipped: no time stamp (nan)"),
@@ -118,7 +116,7 @@ fn timing(text: &mut String, sequence: &Sequence) -> Result<()> {
     let Some(offset) = info.offset else { return Ok(()) };
     writeln!(
         text,
-        "offset        {} by {:.1} ms in the median; at most {:.1} ms apart",
+        "offset        {} by {:.1} ms in the median, by {:.1} ms at most",
         if sequence.depth_source == DepthSource::Stereo { "right lags left" } else { "depth lags colour" },
         seconds(offset.median_ns) * 1e3,
         seconds(offset.max_abs_ns) * 1e3
@@ -126,7 +124,7 @@ fn timing(text: &mut String, sequence: &Sequence) -> Result<()> {
     Ok(())
 }
 
-/// Sizes and depths of some images, whatever the camera says.
+/// Describes sizes and depths of some images, independent of the camera.
 fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>) -> Result<()> {
     let step = sequence.entries.len().div_ceil(SAMPLES).max(1);
     let (mut sizes, mut depths, mut faults) = (Vec::new(), Vec::new(), Vec::new());
@@ -151,7 +149,7 @@ fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>)
     if let Some(first) = faults.first() {
         writeln!(text, "              {} of {opened} opened frames are unusable; the first: {first:#}", faults.len())?;
     }
-    // Without a camera the unit is unknown: the figures are raw then.
+    // Without a camera, depth units are unknown and values are raw.
     let (factor, unit) = camera.map_or((1.0, "raw"), |source| (source.camera.depth_factor, "m"));
     let Some(d) = DepthStatistics::of(&depths, factor) else { return Ok(()) };
     writeln!(
@@ -169,7 +167,7 @@ fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>)
     Ok(())
 }
 
-/// The colour image, and the depth image if that is what comes with it; a right picture is opened too.
+/// Opens the colour image, and the depth or right image; returns the colour and the depth image.
 fn open_images(entry: &FrameEntry, depth_source: DepthSource) -> Result<(RgbImage, Option<Image<u16>>)> {
     let (mut color, mut depth, mut right) = (RgbImage::default(), Image::default(), RgbImage::default());
     let read = |path: &Path| std::fs::read(path).map_err(|error| anyhow::anyhow!("{}: {error}", path.display()));
@@ -229,14 +227,10 @@ fn synthetic(args: &SourceArgs) -> Result<String> {
     let (frames, hz) = (config.frames, config.camera.fps);
     let share_percent = 100.0 * config.person_share;
     let mut text = format!("{}\n", args.sequence);
-    writeln!(
-        text,
-        "frames        {frames} in {:.3} s, {hz} Hz, rendered as they are played",
-        (frames as f64 - 1.0) / hz
-    )?;
+    writeln!(text, "frames        {frames} in {:.3} s, {hz} Hz, rendered during the run", (frames as f64 - 1.0) / hz)?;
     let depth_source = if config.stereo_m > 0.0 { DepthSource::Stereo } else { DepthSource::Image };
     writeln!(text, "kind          synthetic world, {}", sensor(depth_source))?;
-    writeln!(text, "people        {}, who shall cover {share_percent:.0} % of the picture", config.people)?;
+    writeln!(text, "people        {}, intended to cover {share_percent:.0} % of the image", config.people)?;
     describe_camera(&mut text, &world_camera(&config))?;
     writeln!(text, "ground truth  exact")?;
     Ok(text)

@@ -1,4 +1,4 @@
-//! `yfslam synth`: a synthetic world as a folder in TUM layout.
+//! `yfslam synth`: writes a synthetic world as a folder in TUM layout.
 
 use std::path::PathBuf;
 
@@ -10,50 +10,50 @@ use yfslam_io::write::ListedStamps;
 use yfslam_io::{BoxList, Delivery, Fault, FaultInjector, RecordingWriter, StampedPose};
 use yfslam_synth::{CLASS_NAMES, SUITE, SynthFrame, World};
 
-use crate::progress::Progress;
-use crate::source::SourceArgs;
-use crate::terminal::{Terminal, print};
+use crate::input::source::SourceArgs;
+use crate::ui::progress::Progress;
+use crate::ui::terminal::{Terminal, print};
 
-/// Frames in memory at a time, for each thread.
+/// Frames in memory at the same time, for each thread.
 const BATCH_PER_THREAD: usize = 4;
 
-const EXAMPLES: &str = "\
+const HELP: &str = "\
 Examples:
   yfslam synth --list
-  yfslam synth walking_xyz --out walk && yfslam run walk
-  yfslam synth 'sitting_rpy?seed=7&frames=900' --camera tum1 --out sit
-  yfslam synth 'walking_xyz?stereo=0.11' --out pairs          a stereo camera, 0.11 m from left to right
-  yfslam synth walking_static --fault covered@2+1 --fault nan-stamp@5+0.5 --out faulty
+  yfslam synth walking_xyz -o walk && yfslam run walk
+  yfslam synth 'sitting_rpy?seed=7&frames=900' --camera tum1 -o sit
+  yfslam synth 'walking_xyz?stereo=0.11' -o pairs             a stereo camera with a baseline of 0.11 m
+  yfslam synth walking_static --fault covered@2+1 --fault nan-stamp@5+0.5 -o faulty
 
-In the folder:
-  rgb/ depth/ rgb.txt depth.txt associations.txt   as the TUM RGB-D benchmark has them
-  right/ right.txt                                 in place of depth, of a stereo camera
-  groundtruth.txt  the exact pose of every frame, whatever faults were put in
-  camera.toml      the camera
-  boxes.json       class, instance and exact box of everything that can move; `yfslam run` takes them where no --detector is given
-  masks/           per frame, named by its time: 0 where the world stands still, else the instance; for `yfslam run --masks`
-  world.toml       every setting of the world";
+Files in the folder:
+  rgb/ depth/ rgb.txt depth.txt associations.txt   images and lists, as in the TUM RGB-D benchmark
+  right/ right.txt                                 right images instead of depth, of a stereo camera
+  groundtruth.txt                                  exact pose of every frame, also of frames with faults
+  camera.toml                                      camera
+  boxes.json                                       class, instance and exact bounding box of movable objects, for `yfslam run`
+  masks/                                           mask of each frame with instances, 0 for static pixels, for `yfslam run --masks`
+  world.toml                                       all settings of the world";
 
-/// Write a synthetic world to a folder: colour, depth or right pictures, exact poses, boxes and masks.
+/// Write a synthetic world to a folder: images, exact poses, boxes and masks.
 #[derive(Args, Debug)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = HELP)]
 pub struct SynthArgs {
-    /// Which world, such as `walking_xyz` or `walking_xyz?seed=7&people=3&frames=300`.
+    /// Synthetic world, such as `walking_xyz` or `walking_xyz?seed=7&people=3&frames=300`.
     #[arg(value_name = "WORLD", required_unless_present = "list")]
     world: Option<String>,
-    /// The folder to write.
-    #[arg(long, value_name = "DIR", required_unless_present = "list")]
+    /// Folder to write.
+    #[arg(short, long, value_name = "DIR", required_unless_present = "list")]
     out: Option<PathBuf>,
-    /// List the worlds that have a name.
+    /// List the named worlds.
     #[arg(long)]
     list: bool,
-    /// Replace a recording that is there already.
+    /// Replace an existing recording.
     #[arg(long)]
     force: bool,
-    /// The camera: tum1, tum2, tum3, bonn, or a settings file [default: tum3, which has no distortion].
+    /// Camera: tum1, tum2, tum3, bonn, or a settings file [default: tum3, which has no distortion].
     #[arg(long, value_name = "PRESET|FILE")]
     camera: Option<String>,
-    /// Put a fault into the recording, as in `yfslam run`; can be given several times.
+    /// Inject a fault, as in `yfslam run`; the option can be given several times.
     #[arg(long = "fault", value_name = "KIND@START+SECONDS")]
     faults: Vec<Fault>,
 }
@@ -62,12 +62,12 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
     let (world, out) = match (&args.world, &args.out) {
         _ if args.list => return list(),
         (Some(world), Some(out)) => (world, out),
-        _ => bail!("name a world and a folder, as in `yfslam synth walking_xyz --out walk`; --list lists the worlds"),
+        _ => bail!("give a world and a folder, as in `yfslam synth walking_xyz --out walk`; --list prints the worlds"),
     };
     let mut source = SourceArgs::new(world.clone());
     source.camera.clone_from(&args.camera);
     let config = source.world()?;
-    // Before the long work: the folder may be in use.
+    // Created first, so that a folder in use is reported before the long work.
     let mut writer = RecordingWriter::create(out, config.stereo_m > 0.0, args.force)?;
     let world = World::new(&config)?;
     let mut progress = Progress::new(terminal, "rendering", world.len());
@@ -77,12 +77,12 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
     let batch = BATCH_PER_THREAD * rayon::current_num_threads();
     for start in (0..world.len()).step_by(batch) {
         let end = (start + batch).min(world.len());
-        let shots: Vec<SynthFrame> = (start..end).into_par_iter().map(|index| world.frame(index)).collect();
-        shots.par_iter().try_for_each(|shot| writer.write_mask(shot.frame.timestamp_ns, &shot.instances))?;
-        for shot in shots {
-            boxes.frames.push(frame_boxes(&shot));
-            offset_ns = shot.depth_timestamp_ns - shot.frame.timestamp_ns;
-            injector.push(shot.frame);
+        let rendered: Vec<SynthFrame> = (start..end).into_par_iter().map(|index| world.frame(index)).collect();
+        rendered.par_iter().try_for_each(|one| writer.write_mask(one.frame.timestamp_ns, &one.instances))?;
+        for one in rendered {
+            boxes.frames.push(frame_boxes(&one));
+            offset_ns = one.depth_timestamp_ns - one.frame.timestamp_ns;
+            injector.push(one.frame);
         }
         if end == world.len() {
             injector.finish();
@@ -101,7 +101,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
     let truth = |index| StampedPose { timestamp_ns: world.timestamp_ns(index), pose: world.pose(index) };
     writer.finish(&config.camera, &(0..world.len()).map(truth).collect::<Vec<_>>(), &boxes)?;
     terminal.result(&format!(
-        "{} frames of {} px × {} px, people cover {:.0} % of the view; written to {}\n",
+        "{} frames of {} px × {} px, people cover {:.0} % of the image; written to {}\n",
         world.len(),
         config.camera.width,
         config.camera.height,
@@ -115,11 +115,11 @@ fn list() -> Result<()> {
     print(&SUITE.iter().map(|world| format!("{:width$}  {}\n", world.name, world.about)).collect::<String>())
 }
 
-fn frame_boxes(shot: &SynthFrame) -> FrameBoxes {
-    let boxes = shot.boxes.iter().map(|(instance, class, b)| InstanceBox {
+fn frame_boxes(rendered: &SynthFrame) -> FrameBoxes {
+    let boxes = rendered.boxes.iter().map(|(instance, class, b)| InstanceBox {
         instance: *instance,
         class: CLASS_NAMES[*class].to_owned(),
         bbox: [b.x_min, b.y_min, b.x_max, b.y_max],
     });
-    FrameBoxes { timestamp_ns: shot.frame.timestamp_ns, boxes: boxes.collect() }
+    FrameBoxes { timestamp_ns: rendered.frame.timestamp_ns, boxes: boxes.collect() }
 }

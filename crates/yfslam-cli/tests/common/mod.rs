@@ -1,4 +1,4 @@
-//! Runs the real program, and makes small recordings for it: the synthetic world written to disk in TUM layout.
+//! Runs the program, and writes small recordings for it from the synthetic world.
 #![allow(dead_code, reason = "each test file uses a part")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
@@ -17,7 +17,7 @@ use yfslam_synth::World;
 /// A small world without people: quick to render, easy to track.
 pub const SMALL_WORLD: &str = "synth:walking_xyz?people=0&width=320&height=240&frames=12";
 
-/// What the program said.
+/// The output of the program.
 #[derive(Debug)]
 pub struct Output {
     pub success: bool,
@@ -39,21 +39,21 @@ pub fn succeeds(folder: &Path, args: &[&str]) -> Output {
     output
 }
 
-/// Runs the program and expects a failure whose message holds all of `words`.
+/// Runs the program and expects a failure whose message contains all of `words`.
 pub fn fails(folder: &Path, args: &[&str], words: &[&str]) {
     let output = yfslam(folder, args);
     assert!(!output.success, "{args:?} succeeded: {}", output.stdout);
     for word in words {
-        assert!(output.stderr.contains(word), "{args:?} does not say '{word}': {}", output.stderr);
+        assert!(output.stderr.contains(word), "{args:?} does not contain '{word}': {}", output.stderr);
     }
 }
 
-/// The `run.json` of an output folder.
+/// Returns the `run.json` of an output folder.
 pub fn report(out: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(out.join("run.json")).unwrap()).unwrap()
 }
 
-/// Root mean square of the absolute trajectory error in a report, m.
+/// Returns the RMSE of the absolute trajectory error in a report, m.
 pub fn ate_rmse(report: &Value) -> f64 {
     report["evaluation"]["ate"]["translation_m"]["rmse"].as_f64().unwrap()
 }
@@ -106,7 +106,7 @@ pub fn edit_lines(path: &Path, edit: impl Fn(usize, &str) -> Option<String>) {
     fs::write(path, lines.map(|line| line + "\n").collect::<String>()).unwrap();
 }
 
-/// A file or folder of the development data, or `None`, having said so.
+/// Returns a file or folder of the development data; prints a message and returns `None` if it is missing.
 pub fn real_data(name: &str) -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let root = std::env::var_os("YFSLAM_DATA").map_or(beside, PathBuf::from);

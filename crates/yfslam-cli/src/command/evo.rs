@@ -1,0 +1,173 @@
+//! `yfslam ape` and `yfslam rpe`: one error of a trajectory, with the options of the tool evo.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::{Args, ValueEnum};
+use yfslam_eval::{AlignmentKind, Delta, Match, RpeOptions, Statistics, associate, ate, rpe};
+use yfslam_report::{TableStyle, errors_table, rpe_errors};
+
+use crate::input::trajectory::read_poses;
+use crate::ui::terminal::{Terminal, print};
+
+const APE_HELP: &str = "\
+Examples:
+  yfslam ape groundtruth.txt trajectory.txt -a
+  yfslam ape tum groundtruth.txt mono.txt -as
+
+Difference from evo:
+  The trajectories are always aligned, with or without -a. `yfslam eval` prints all errors at once.";
+
+const RPE_HELP: &str = "\
+Examples:
+  yfslam rpe groundtruth.txt trajectory.txt -r angle_deg
+  yfslam rpe tum groundtruth.txt trajectory.txt -d 1 -u s --all_pairs
+
+Difference from evo:
+  The unit s (seconds) is added. With -r full, both errors are printed, each in its unit. `yfslam eval` prints all errors at once.";
+
+/// Compute the absolute trajectory error (ATE, or APE in evo), with the options of evo.
+#[derive(Args, Debug)]
+#[command(after_help = APE_HELP)]
+pub struct ApeArgs {
+    #[command(flatten)]
+    common: CommonArgs,
+}
+
+/// Compute the relative pose error (RPE), with the options of evo.
+#[derive(Args, Debug)]
+#[command(after_help = RPE_HELP)]
+pub struct RpeArgs {
+    #[command(flatten)]
+    common: CommonArgs,
+    /// Interval between two poses.
+    #[arg(short, long, value_name = "N", default_value_t = 1.0)]
+    delta: f64,
+    /// Unit of the interval: frames, seconds or metres.
+    #[arg(short = 'u', long = "delta_unit", value_enum, default_value = "f")]
+    unit: Unit,
+    /// Start an interval at every pose and not only where the last one ended.
+    #[arg(long = "all_pairs")]
+    all_pairs: bool,
+}
+
+/// Options of both commands.
+#[derive(Args, Debug)]
+struct CommonArgs {
+    /// Ground truth, then the estimated trajectory, both in TUM format; the word `tum` may come before them.
+    #[arg(value_name = "FILE", num_args = 2..=3, required = true)]
+    files: Vec<PathBuf>,
+    /// Align the trajectories by rotation and translation.
+    #[arg(short, long)]
+    align: bool,
+    /// Correct the scale, too; only together with -a.
+    #[arg(short = 's', long = "correct_scale", requires = "align")]
+    correct_scale: bool,
+    /// Which part of the error is computed.
+    #[arg(short = 'r', long = "pose_relation", value_enum, default_value = "trans_part")]
+    relation: Relation,
+    /// Largest difference between the time stamps of an estimated and a true pose, s.
+    #[arg(long = "t_max_diff", value_name = "S", default_value_t = 0.01)]
+    t_max_diff: f64,
+    /// Not supported.
+    #[arg(short, long, hide = true)]
+    plot: bool,
+    /// Not supported.
+    #[arg(long = "save_results", value_name = "FILE", hide = true)]
+    save_results: Option<PathBuf>,
+}
+
+/// Parts of an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+enum Relation {
+    /// Translation, m.
+    TransPart,
+    /// Rotation, degrees.
+    AngleDeg,
+    /// Translation and rotation.
+    Full,
+}
+
+/// Units of an interval.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Unit {
+    /// Frames.
+    F,
+    /// Seconds.
+    S,
+    /// Metres.
+    M,
+}
+
+pub fn run_ape(args: &ApeArgs, terminal: Terminal) -> Result<()> {
+    ensure!(
+        args.common.relation == Relation::TransPart,
+        "`yfslam ape` computes the error of translation only; use -r trans_part, or `yfslam rpe` for rotation"
+    );
+    let (matches, path) = args.common.matches(terminal)?;
+    let kind = if args.common.correct_scale { AlignmentKind::Sim3 } else { AlignmentKind::Se3 };
+    let error = ate(&matches, kind).with_context(|| cannot_evaluate(path))?;
+    print_errors([(format!("ATE, {kind} (m)"), error.translation_m)], matches.len())
+}
+
+pub fn run_rpe(args: &RpeArgs, terminal: Terminal) -> Result<()> {
+    let options = RpeOptions::new(args.interval()?, args.all_pairs || matches!(args.unit, Unit::S));
+    let (mut matches, path) = args.common.matches(terminal)?;
+    if args.common.correct_scale {
+        matches = ate(&matches, AlignmentKind::Sim3).with_context(|| cannot_evaluate(path))?.alignment.scaled(&matches);
+    }
+    let [translation, rotation] = rpe_errors(&rpe(&matches, &options).with_context(|| cannot_evaluate(path))?);
+    let errors = match args.common.relation {
+        Relation::TransPart => vec![translation],
+        Relation::AngleDeg => vec![rotation],
+        Relation::Full => vec![translation, rotation],
+    };
+    print_errors(errors, matches.len())
+}
+
+impl RpeArgs {
+    fn interval(&self) -> Result<Delta> {
+        ensure!(self.delta > 0.0 && self.delta.is_finite(), "--delta is {}; give a positive number", self.delta);
+        Ok(match self.unit {
+            Unit::S => Delta::Seconds(self.delta),
+            Unit::M => Delta::Metres(self.delta),
+            Unit::F if self.delta.fract() == 0.0 => Delta::Frames(self.delta as usize),
+            Unit::F => bail!("--delta is {} frames; give a whole number, or another unit with -u", self.delta),
+        })
+    }
+}
+
+impl CommonArgs {
+    /// Reads and associates the trajectories; returns the file of the estimate beside the matches.
+    fn matches(&self, terminal: Terminal) -> Result<(Vec<Match>, &Path)> {
+        ensure!(!self.plot, "--plot is not supported; `yfslam run --report` writes a page with figures");
+        ensure!(
+            self.save_results.is_none(),
+            "--save_results is not supported; `yfslam eval --json` prints all results"
+        );
+        let (truth, estimate) = match &self.files[..] {
+            [truth, estimate] => (truth, estimate),
+            [format, truth, estimate] if format.as_os_str() == "tum" => (truth, estimate),
+            [format, ..] => bail!("the format {} is not supported; give two files in TUM format", format.display()),
+            [] => bail!("give the ground truth and the estimated trajectory"),
+        };
+        ensure!(
+            (0.0..=1e6).contains(&self.t_max_diff),
+            "--t_max_diff is {}; give seconds, such as 0.01",
+            self.t_max_diff
+        );
+        let max_diff_ns = (self.t_max_diff * 1e9) as u64;
+        let (reference, poses) = (read_poses(truth, terminal)?, read_poses(estimate, terminal)?);
+        let matches = associate(&reference, &poses, max_diff_ns).with_context(|| cannot_evaluate(estimate))?;
+        Ok((matches, estimate))
+    }
+}
+
+fn cannot_evaluate(path: &Path) -> String {
+    format!("cannot evaluate {}", path.display())
+}
+
+fn print_errors(errors: impl IntoIterator<Item = (String, Statistics)>, matches: usize) -> Result<()> {
+    print(&format!("{}\n{matches} pairs of poses\n", errors_table(errors).render(TableStyle::Plain)))
+}

@@ -1,0 +1,264 @@
+//! `yfslam run`: tracks a sequence with one method or several.
+
+mod drive;
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, ensure};
+use clap::{Args, Command, FromArgMatches};
+use yfslam::Config;
+use yfslam::config::DepthSource;
+use yfslam::dynamic::Method;
+use yfslam_report::{TableStyle, evaluation_table};
+
+use self::drive::{RecordedResult, Setup, drive, finish};
+use crate::input::boxes;
+use crate::input::detector::DetectorArgs;
+use crate::input::settings::{MethodArg, SettingsArgs, describe};
+use crate::input::source::{MaskTally, Source, SourceArgs, Truth};
+use crate::output::folder::OutputFolder;
+use crate::output::html;
+use crate::output::recorder::RunOutputs;
+use crate::output::report::{ReportedRun, RunReport};
+use crate::output::summary;
+use crate::run::cost::frame_costs;
+use crate::run::evaluation::EvaluationArgs;
+use crate::run::map_args::MapArgs;
+use crate::run::method_run::{EvalContext, RunResult};
+use crate::run::shared_detector::{DetectionTally, SharedDetector};
+use crate::ui::terminal::{Terminal, explain};
+
+const HELP: &str = "\
+Examples:
+  yfslam run rgbd_bonn_crowd --camera bonn
+  yfslam run rgbd_dataset_freiburg1_xyz --camera tum1 --method none
+  yfslam run 'synth:walking_xyz?seed=7&frames=300' -o walk         needs no data
+  yfslam run synth:walking_rpy --method none,boxes,yf --report     several methods and a report
+  yfslam run DIR --start 100 --end 400 --reverse --overlay --report
+  yfslam run DIR --save-map lab.map                                saves the map
+  yfslam run OTHER --load-map lab.map --localise                   localises in it
+  yfslam run DIR --dense --save-map lab.map                        adds a dense map, for `yfslam map lab.map`
+  yfslam run DIR --masks DIR/masks                                 uses your own segmentation
+  yfslam run DIR --sensor mono                                     uses the colour images only
+  yfslam run DIR --detect-every 3                                  runs the detector on every third frame
+  yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
+
+Files in the output folder:
+  trajectory.txt  final poses of all tracked frames, world from camera (TUM format)
+  keyframes.txt   final poses of the keyframes
+  live.txt        poses of all tracked frames as estimated at the time of each frame
+  map.ply         landmarks with colour
+  run.json        input, counts of frames, times, errors
+  config.toml     the configuration of this run; --config repeats the run with it
+  dense.map       with --dense, the input of `yfslam map`
+  overlay/        with --overlay, one image for each frame
+  report.html     with --report, one page with errors, figures, images and times
+
+Detections:
+  The methods boxes, yf, ds, dyna and full need the bounding boxes of people. Without --detector, boxes come from the synthetic world or
+  from the file boxes.json in the folder, else from the network in this program. With --masks alone, no detector is running.
+
+Masks (--masks):
+  One PNG image for each colour image, with the same name or named by its time stamp, or listed in `masks.txt` in the folder.
+  Pixels with the value 0 belong to no movable object. The methods ds, dyna and full use masks, and then need no boxes.
+
+Several methods:
+  Each method has its own folder in the output folder, such as OUT/none. Each frame is read and searched for people once; the results
+  equal those of separate runs. If a method fails, its folder has a file failure.txt, and the other methods continue.
+
+A single camera (--sensor mono):
+  The scale is unknown: the median depth of the first landmarks is 1. Errors are computed after alignment with scale, Sim(3). The map
+  is initialised after sideways motion of the camera, and again when the camera is lost and not relocalised. Loop closing corrects drift
+  of the scale.
+
+Kinds of faults (--fault):
+  dropped, repeated, blank, black, frozen, late, depth-dropout, nan-stamp, covered
+
+Exit status:
+  Success if at least one method produced a trajectory.";
+
+/// Evenly spread snapshots in the report of one method.
+const SNAPSHOTS: usize = 5;
+/// The same for each of several methods.
+const SNAPSHOTS_OF_EACH: usize = 3;
+
+/// Track a sequence; trajectory, map and report are written to a folder.
+#[derive(Args, Debug)]
+#[command(after_help = HELP)]
+pub struct RunArgs {
+    #[command(flatten)]
+    source: SourceArgs,
+    /// Methods for dynamic scenes [default: full]; with several methods, the others are compared with the first one.
+    #[arg(
+        long = "method",
+        alias = "methods",
+        value_enum,
+        value_name = "METHOD,METHOD",
+        value_delimiter = ',',
+        help_heading = "System"
+    )]
+    methods: Vec<MethodArg>,
+    #[command(flatten)]
+    settings: SettingsArgs,
+    #[command(flatten)]
+    detector: DetectorArgs,
+    #[command(flatten)]
+    map: MapArgs,
+    /// Output folder [default: yfslam-out/NAME, the name of the sequence].
+    #[arg(short, long, value_name = "DIR", help_heading = "Output")]
+    out: Option<PathBuf>,
+    /// Write an image of each frame with boxes (yellow), moving regions (red), static features (green) and dynamic features (red).
+    #[arg(long, help_heading = "Output")]
+    overlay: bool,
+    /// Make a dense map, `dense.map`, for `yfslam map`.
+    #[arg(long, help_heading = "Output")]
+    dense: bool,
+    /// Write `report.html`, a page with errors, figures, images and times.
+    #[arg(long, help_heading = "Output")]
+    report: bool,
+    /// Ground truth, in TUM format or in the format of the folder [default: the ground truth in the folder].
+    #[arg(long, value_name = "FILE", help_heading = "Evaluation")]
+    groundtruth: Option<PathBuf>,
+    #[command(flatten)]
+    evaluation: EvaluationArgs,
+}
+
+pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
+    let mut config = args.settings.resolve()?;
+    let methods = args.methods(&config)?;
+    let max_diff_ns = args.evaluation.max_diff_ns()?;
+    let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
+    let mut source =
+        Source::open(&args.source, config.depth.source, boxes.is_source().then_some(&*config.dynamic.movable))?;
+    config.depth.source = source.depth_source;
+    ensure!(
+        !args.dense || config.depth.source == DepthSource::Image,
+        "--dense needs depth images, which {} does not have or --sensor leaves unused; leave it out",
+        source.name
+    );
+    if let Some(masks) = &source.masks {
+        report_masks(masks, terminal);
+    }
+    let truth = find_truth(args, &source, terminal)?;
+    let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
+    args.map.check()?;
+    let snapshots = args.report.then_some(if methods.len() == 1 { SNAPSHOTS } else { SNAPSHOTS_OF_EACH });
+    let outputs = RunOutputs { overlay: args.overlay, snapshots };
+    let setup = Setup { source: &source, config: &config, map: &args.map, outputs, makes_dense_map: args.dense };
+    let (mut runs, mut shared) = setup.prepare(&methods, &out, detector)?;
+    let (reading, process) = drive(&mut source, shared.as_mut(), &mut runs, terminal);
+
+    let detection = shared.map_or_else(DetectionTally::default, SharedDetector::into_tally);
+    let (reading, truth) = (&reading, truth.as_ref());
+    let alignment = args.evaluation.alignment(config.depth.source != DepthSource::Motion);
+    let context =
+        EvalContext { source: &source, truth, max_diff_ns, alignment, boxes: &boxes, reading, detection: &detection };
+    let results = finish(runs, context, &args.map, terminal)?;
+    let only_results: Vec<&RunResult> = results.iter().map(|recorded| &recorded.result).collect();
+    let costs = frame_costs(&process, &detection, &only_results);
+    let (sequence, faults) = (args.source.sequence.as_str(), args.source.faults.as_slice());
+    let source = &source;
+    let runs: Vec<ReportedRun> = results
+        .iter()
+        .zip(costs)
+        .map(|(RecordedResult { result, images, .. }, cost)| ReportedRun {
+            sequence,
+            source,
+            faults,
+            truth,
+            result,
+            images,
+            cost,
+        })
+        .collect();
+    for (run, RecordedResult { folder, .. }) in runs.iter().zip(&results) {
+        let report = RunReport::new(run);
+        folder.write_report(&report)?;
+        if methods.len() == 1 {
+            terminal.result(&summary::of_one(&report, run)?)?;
+        }
+    }
+    let page = args.report.then(|| html::write(&out, &runs, &reading.and(&detection.stages))).transpose()?;
+    if methods.len() > 1 {
+        terminal.result(&summary::of_several(&runs, truth))?;
+    } else if let Some(evaluation) = only_results.first().and_then(|result| result.evaluation()) {
+        terminal.result(&format!("\n{}", evaluation_table(evaluation, TableStyle::Plain)))?;
+    }
+    terminal.result(&format!("\nwritten to {}\n", out.path().display()))?;
+    if let Some(page) = page {
+        terminal.result(&format!("report: {}\n", page.display()))?;
+    }
+    check_accuracy(args, &only_results, terminal)
+}
+
+impl RunArgs {
+    /// Parses arguments of `yfslam run`, for other commands.
+    ///
+    /// # Errors
+    /// `yfslam run` would refuse the arguments.
+    pub fn parse(arguments: &[OsString]) -> Result<Self> {
+        let command = Self::augment_args(Command::new("yfslam run").no_binary_name(true));
+        Ok(Self::from_arg_matches(&command.try_get_matches_from(arguments)?)?)
+    }
+
+    /// Returns the requested methods, each once; else the method of the configuration.
+    fn methods(&self, config: &Config) -> Result<Vec<Method>> {
+        let mut methods: Vec<Method> = Vec::new();
+        for method in self.methods.iter().map(|m| m.method()) {
+            if !methods.contains(&method) {
+                methods.push(method);
+            }
+        }
+        if methods.is_empty() {
+            methods.push(config.dynamic.method);
+        }
+        ensure!(
+            !config.dynamic.detect_async || self.map.threaded,
+            "--detect-async (dynamic.detect_async) is for live use, with results that differ from run to run; add --threaded"
+        );
+        let options = self.map.single_method_options();
+        ensure!(
+            methods.len() == 1 || options.is_empty(),
+            "{} cannot be used with several methods, because each method makes its own map; give one --method",
+            options.join(" and ")
+        );
+        Ok(methods)
+    }
+}
+
+/// Reports how many frames have a mask.
+fn report_masks(masks: &MaskTally, terminal: Terminal) {
+    let MaskTally { folder, found, missing, first_missing } = masks;
+    terminal.note(&format!("{found} of {} frames have a mask in {}", found + missing, folder.display()));
+    if let Some(first) = first_missing {
+        terminal.warn(&format!(
+            "{missing} frames have no mask, and nothing is masked in them; the first missing file is {}",
+            first.display()
+        ));
+    }
+}
+
+/// Reads the ground truth. A broken one is an error only if the user named it.
+fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Option<Truth>> {
+    match source.truth(args.groundtruth.as_deref(), terminal) {
+        Err(error) if args.groundtruth.is_none() => {
+            terminal.warn(&format!("no evaluation: {}", explain(&error)));
+            Ok(None)
+        }
+        truth => truth.context("the ground truth cannot be used"),
+    }
+}
+
+/// Warns where errors cannot be computed; fails if the user named a ground truth.
+fn check_accuracy(args: &RunArgs, results: &[&RunResult], terminal: Terminal) -> Result<()> {
+    for result in results {
+        let Some(Err(error)) = &result.evaluation else { continue };
+        if args.groundtruth.is_some() {
+            return Err(error.clone()).context("the trajectory was written, but it cannot be evaluated");
+        }
+        let (name, _) = describe(result.config.dynamic.method);
+        terminal.warn(&format!("{name}: no evaluation: {error}"));
+    }
+    Ok(())
+}

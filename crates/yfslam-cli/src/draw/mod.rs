@@ -1,0 +1,7 @@
+//! Drawing on images, and encoding them.
+
+pub mod colors;
+pub mod dense_image;
+pub mod indexed_png;
+pub mod shapes;
+pub mod shrink;

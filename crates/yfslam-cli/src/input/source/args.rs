@@ -1,0 +1,151 @@
+//! Which sequence is read, and how.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail, ensure};
+use clap::{Args, ValueEnum};
+use yfslam::config::DepthSource;
+use yfslam_io::boxes::BOXES_FILE;
+use yfslam_io::{Fault, load_camera};
+use yfslam_synth::{WorldConfig, default_camera, parse_with_camera};
+
+use super::masks::{MaskTally, Masks};
+
+/// Largest difference between the time stamps of a colour and a depth image, ms. Source: the tool of the TUM RGB-D benchmark.
+const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
+
+/// Which sequence is read, and how.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Input")]
+pub struct SourceArgs {
+    /// Folder in TUM RGB-D, Bonn, EuRoC or KITTI odometry layout, or a synthetic world such as `synth:walking_xyz?seed=7`.
+    #[arg(value_name = "SEQUENCE", help_heading = None)]
+    pub sequence: String,
+    /// Camera: tum1, tum2, tum3, bonn, or a settings file in TOML or ORB-SLAM's YAML [default: the camera file in the folder].
+    #[arg(long, value_name = "PRESET|FILE")]
+    pub camera: Option<String>,
+    /// Type of the camera [default: what the sequence has].
+    #[arg(long, value_enum, value_name = "SENSOR")]
+    pub sensor: Option<SensorArg>,
+    /// Depth units per metre [default: those of the camera; TUM and Bonn have 5000, images in millimetres have 1000].
+    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    pub depth_factor: Option<f64>,
+    /// Largest difference between the time stamps of a colour image and its depth or right image, ms.
+    #[arg(long, value_name = "MS", default_value_t = ASSOCIATION_TOLERANCE_MS, allow_negative_numbers = true)]
+    pub association_tolerance: f64,
+    /// Folder with a mask of movable objects for each colour image, for the methods ds, dyna and full.
+    #[arg(long, value_name = "DIR")]
+    pub masks: Option<PathBuf>,
+    /// First frame, counted from 0.
+    #[arg(long, value_name = "I", default_value_t = 0)]
+    pub start: usize,
+    /// Frame before which the run stops [default: the end].
+    #[arg(long, value_name = "J")]
+    pub end: Option<usize>,
+    /// Play the frames in reverse order, with mirrored time stamps.
+    #[arg(long)]
+    pub reverse: bool,
+    /// Inject a fault from START seconds on for SECONDS; the option can be given several times.
+    #[arg(long = "fault", value_name = "KIND@START+SECONDS")]
+    pub faults: Vec<Fault>,
+}
+
+/// Types of cameras.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SensorArg {
+    /// Colour and depth images.
+    Rgbd,
+    /// Left and right images.
+    Stereo,
+    /// Images of one camera; depth or right images are ignored, and the scale of the trajectory is arbitrary.
+    Mono,
+}
+
+impl SourceArgs {
+    /// Returns which frames of a recording have a mask; `None` without `--masks`.
+    ///
+    /// # Errors
+    /// No frame has a mask, or the first mask cannot be used.
+    pub fn mask_tally(&self, sequence: &yfslam_io::Sequence, camera: &yfslam::Camera) -> Result<Option<MaskTally>> {
+        let masks = self.masks.as_deref().map(|folder| Masks::open(folder, sequence, camera)).transpose()?;
+        Ok(masks.map(|masks| masks.tally))
+    }
+
+    /// Selects a whole sequence, forward, with its own camera.
+    pub fn new(sequence: String) -> Self {
+        Self {
+            sequence,
+            camera: None,
+            sensor: None,
+            depth_factor: None,
+            masks: None,
+            association_tolerance: ASSOCIATION_TOLERANCE_MS,
+            start: 0,
+            end: None,
+            reverse: false,
+            faults: Vec::new(),
+        }
+    }
+
+    /// Returns the requested source of depth: the flag overrides the configuration; `None` leaves the choice to the sequence.
+    pub fn wanted_depth_source(&self, configured: DepthSource) -> Option<DepthSource> {
+        match self.sensor {
+            Some(SensorArg::Rgbd) => Some(DepthSource::Image),
+            Some(SensorArg::Stereo) => Some(DepthSource::Stereo),
+            Some(SensorArg::Mono) => Some(DepthSource::Motion),
+            None => Some(configured).filter(|configured| *configured != DepthSource::Image),
+        }
+    }
+
+    /// Returns the source of depth in a sequence that offers `offered`.
+    ///
+    /// # Errors
+    /// The sequence does not have the requested images.
+    pub fn depth_source(&self, configured: DepthSource, offered: DepthSource) -> Result<DepthSource> {
+        let wanted = self.wanted_depth_source(configured).unwrap_or(offered);
+        ensure!(
+            wanted == offered || wanted == DepthSource::Motion,
+            "{} has no {}; leave out --sensor {} (or depth.source in --config), or use `mono`",
+            self.sequence,
+            if wanted == DepthSource::Stereo { "right images" } else { "depth images" },
+            if wanted == DepthSource::Stereo { "stereo" } else { "rgbd" }
+        );
+        Ok(wanted)
+    }
+
+    /// Returns the synthetic world with the requested camera.
+    ///
+    /// # Errors
+    /// The name of the world or the camera cannot be used.
+    pub fn world(&self) -> Result<WorldConfig> {
+        if self.depth_factor.is_some() {
+            bail!("a synthetic world has the depth factor of its camera; leave out --depth-factor");
+        }
+        if self.masks.is_some() {
+            bail!("masks belong to the images of a folder; write the world with `yfslam synth` to run it with --masks");
+        }
+        let camera = match &self.camera {
+            Some(spec) => load_camera(spec, None)?.camera,
+            None => default_camera(),
+        };
+        Ok(parse_with_camera(&self.sequence, camera)?)
+    }
+
+    /// Returns whether boxes come with the sequence: from a synthetic world, or from a `boxes.json`.
+    pub fn has_boxes(&self) -> bool {
+        self.is_synthetic() || self.boxes_file().is_file()
+    }
+
+    pub fn boxes_file(&self) -> PathBuf {
+        self.folder().join(BOXES_FILE)
+    }
+
+    /// Returns whether the sequence is a synthetic world.
+    pub fn is_synthetic(&self) -> bool {
+        yfslam_synth::is_spec(&self.sequence)
+    }
+
+    pub fn folder(&self) -> &Path {
+        Path::new(&self.sequence)
+    }
+}

@@ -1,0 +1,47 @@
+//! The dense map of a run as a file, and drawn for the report.
+
+use std::path::Path;
+
+use anyhow::Result;
+use yfslam::dense::cloud::cloud;
+use yfslam::dense::{DenseConfig, Survey, up};
+use yfslam::image::RgbImage;
+use yfslam_io::write_atomically;
+use yfslam_report::DenseMap;
+
+use crate::draw::dense_image::{SHOWN_M, from_above, from_corner};
+use crate::draw::indexed_png::to_png;
+
+/// Name of the file in the output folder.
+pub const DENSE_FILE: &str = "dense.map";
+
+/// Width and height of the images in the report, px.
+const IMAGE_PX: [usize; 2] = [480, 360];
+
+/// Writes the dense map, as [`yfslam::dense::persist::encode`] gives it, into the output folder.
+///
+/// # Errors
+/// The file cannot be written; an earlier file then stays.
+pub fn write(folder: &Path, encoded: &[u8]) -> Result<()> {
+    Ok(write_atomically(&folder.join(DENSE_FILE), |file| file.write_all(encoded))?)
+}
+
+/// Draws the dense map for the report.
+///
+/// # Errors
+/// An image is too large for PNG.
+pub fn images(config: &DenseConfig, map: &Survey) -> Result<DenseMap> {
+    let turn = up::of_survey(map);
+    let volume = map.volume(config, &turn, |_| {});
+    let points = cloud(map, &volume, |_| {});
+    let cut_m = up::floor_m(map, &turn).unwrap_or_default() as f32 + SHOWN_M;
+    let above = from_above(&points, config.resolution_m, cut_m, IMAGE_PX);
+    let corner = from_corner(&points, config.resolution_m, cut_m, IMAGE_PX);
+    let png = |image: &RgbImage| -> Result<_> { Ok((to_png(image)?, [image.width(), image.height()])) };
+    Ok(DenseMap {
+        keyframes: map.pieces.len(),
+        occupied: volume.voxels().filter(|known| known.occupied).count(),
+        resolution_m: config.resolution_m,
+        views: [png(&above)?, png(&corner)?],
+    })
+}

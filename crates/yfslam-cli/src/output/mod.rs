@@ -1,0 +1,14 @@
+//! What a command leaves behind: folders, files, reports, summaries.
+
+pub mod class_legend;
+pub mod dense;
+pub mod detections_file;
+pub mod folder;
+pub mod html;
+mod overlay;
+pub mod processor_time;
+pub mod recorder;
+pub mod report;
+pub mod rle;
+mod snapshots;
+pub mod summary;

@@ -1,0 +1,127 @@
+//! One method on one sequence.
+//!
+//! In: frames, which several methods may share. Out: a [`RunResult`].
+
+use anyhow::Result;
+use yfslam::tracking::TrackingState;
+use yfslam::{Config, Detector, Execution, RgbdFrame, Slam};
+use yfslam_eval::{AlignmentKind, EvalError, EvalOptions, Evaluation, ExpectedFrames};
+
+use super::dense::{DenseCost, DenseResult, DenseRun};
+use super::evaluation::evaluate_possible;
+use super::map_args::MapArgs;
+use super::pipeline::{Outcome, Pipeline};
+use super::shared_detector::DetectionTally;
+use crate::input::boxes::BoxOrigin;
+use crate::input::detector::LoadedDetector;
+use crate::input::source::{Source, Truth};
+use crate::input::trajectory::to_eval;
+use crate::stats::skip::Skip;
+use crate::stats::stages::Stages;
+
+/// One method at work.
+pub struct MethodRun {
+    pub config: Config,
+    pub pipeline: Pipeline,
+    pub state: TrackingState,
+    dense: Option<DenseRun>,
+}
+
+/// What a run is evaluated with.
+#[derive(Clone, Copy)]
+pub struct EvalContext<'a> {
+    pub source: &'a Source,
+    pub truth: Option<&'a Truth>,
+    pub max_diff_ns: u64,
+    pub alignment: AlignmentKind,
+    /// Where the boxes come from, for methods that need them.
+    pub boxes: &'a BoxOrigin,
+    /// Durations of reading the frames.
+    pub reading: &'a Stages,
+    /// Cost of detection that several methods share.
+    pub detection: &'a DetectionTally,
+}
+
+/// The result of one method.
+pub struct RunResult<'a> {
+    pub config: Config,
+    pub outcome: Outcome,
+    /// Where its boxes come from.
+    pub boxes: &'a BoxOrigin,
+    /// Stages that several methods share: reading, and detection.
+    pub shared: Stages,
+    /// `None` without ground truth.
+    pub evaluation: Option<Result<Evaluation, EvalError>>,
+    pub dense_cost: Option<DenseCost>,
+}
+
+impl MethodRun {
+    /// Prepares a method for the frames of `source`, with a detector of its own if it is the only method.
+    ///
+    /// # Errors
+    /// The configuration, the detector or a map cannot be used.
+    pub fn prepare(
+        config: Config,
+        source: &Source,
+        detector: Option<LoadedDetector>,
+        makes_dense_map: bool,
+        map: &MapArgs,
+    ) -> Result<Self> {
+        let (detector, times) = detector.map(|d| (d.detector as Box<dyn Detector>, d.times)).unzip();
+        let earlier = map.dense_map(makes_dense_map)?;
+        let slam = map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
+        let pipeline = Pipeline::new(slam, map.execution() == Execution::Inline, times);
+        let (camera, execution) = (&source.camera.camera, map.execution());
+        let dense = makes_dense_map
+            .then(|| DenseRun::new(&config.dense, camera, execution, earlier, pipeline.slam()))
+            .transpose()?;
+        Ok(Self { config, pipeline, dense, state: TrackingState::default() })
+    }
+
+    /// Tracks one frame, or counts one that cannot be used.
+    pub fn process(&mut self, frame: &Result<RgbdFrame, Skip>) {
+        match frame {
+            Ok(frame) => {
+                self.state = self.pipeline.track(frame);
+                if let Some(dense) = &mut self.dense {
+                    dense.insert(frame, &mut self.pipeline);
+                }
+            }
+            Err(skip) => self.pipeline.skip(skip.clone()),
+        }
+    }
+
+    /// Ends the run, saves its map if that was asked for, and evaluates it. Returns the dense map beside the result.
+    ///
+    /// # Errors
+    /// There is no trajectory, with the reason, or the map cannot be written.
+    pub fn finish<'a>(self, context: EvalContext<'a>, map: &MapArgs) -> Result<(RunResult<'a>, Option<DenseResult>)> {
+        let Self { config, mut pipeline, dense, .. } = self;
+        let dense_cost = dense.as_ref().map(DenseRun::cost);
+        let dense = dense.map(|dense| DenseResult::new(dense.finish(&mut pipeline))).transpose()?;
+        map.save(&mut pipeline, dense.as_ref().map(|dense| dense.encoded.as_slice()))?;
+        let mut outcome = pipeline.finish(&config)?;
+        let mut shared = context.reading.clone();
+        let needs_boxes = config.dynamic.method.needs_boxes();
+        if needs_boxes {
+            let DetectionTally { stages, failures, .. } = context.detection;
+            shared = shared.and(stages);
+            outcome.frames.detector_failures += failures;
+        }
+        let evaluation = context.truth.map(|truth| {
+            let expected = ExpectedFrames::StampsNs(context.source.stamps_ns.clone());
+            let EvalContext { max_diff_ns, alignment, .. } = context;
+            let options = EvalOptions { max_diff_ns, alignment, expected, ..Default::default() };
+            evaluate_possible(&truth.poses, &to_eval(&outcome.trajectory), options)
+        });
+        let boxes = if needs_boxes { context.boxes } else { &BoxOrigin::None };
+        Ok((RunResult { config, outcome, boxes, shared, evaluation, dense_cost }, dense))
+    }
+}
+
+impl RunResult<'_> {
+    /// Returns the errors, if they are known.
+    pub fn evaluation(&self) -> Option<&Evaluation> {
+        self.evaluation.as_ref()?.as_ref().ok()
+    }
+}

@@ -1,0 +1,9 @@
+//! SLAM on a sequence, and its evaluation.
+
+pub mod cost;
+pub mod dense;
+pub mod evaluation;
+pub mod map_args;
+pub mod method_run;
+pub mod pipeline;
+pub mod shared_detector;

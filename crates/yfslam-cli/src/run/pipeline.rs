@@ -1,0 +1,278 @@
+//! Runs SLAM on frames and records the results.
+//!
+//! In: a SLAM system, frames. Out: an [`Outcome`]. Ground truth is not used here.
+
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use yfslam::config::DepthSource;
+use yfslam::geometry::Pose;
+use yfslam::tracking::TrackingState;
+use yfslam::{Config, RgbdFrame, Slam, Tracked};
+use yfslam_io::StampedPose;
+use yfslam_io::time::format_stamp;
+use yfslam_io::write::PlyPoint;
+
+use crate::input::detector::DetectorTime;
+use crate::stats::cpu;
+use crate::stats::process::{Part, Parts};
+use crate::stats::recognition::RecognitionTally;
+use crate::stats::skip::Skip;
+use crate::stats::stages::Stages;
+use crate::stats::tally::{DynamicTally, FrameTally};
+
+/// SLAM with a record of its results.
+pub struct Pipeline {
+    slam: Slam,
+    /// Durations of all stages of all frames.
+    pub stages: Stages,
+    frames: FrameTally,
+    dynamic: DynamicTally,
+    recognition: RecognitionTally,
+    live: Vec<StampedPose>,
+    resets: usize,
+    made_keyframe: bool,
+    detector_times: Option<Receiver<DetectorTime>>,
+    parts: Parts,
+    maps_inline: bool,
+    started: Instant,
+    state: TrackingState,
+    /// Largest number of features, and of static features with depth, in a frame before initialisation.
+    best_start: (usize, usize),
+}
+
+/// The results of a run.
+pub struct Outcome {
+    /// Final poses of all tracked frames.
+    pub trajectory: Vec<StampedPose>,
+    /// Poses of all tracked frames as estimated at their time.
+    pub live: Vec<StampedPose>,
+    /// Keyframes of this run in the final map.
+    pub keyframes: Vec<StampedPose>,
+    /// Landmarks of the final map.
+    pub landmarks: Vec<PlyPoint>,
+    pub frames: FrameTally,
+    pub dynamic: DynamicTally,
+    pub recognition: RecognitionTally,
+    pub stages: Stages,
+    /// From the first frame to the last.
+    pub wall: Duration,
+    /// Processor time of tracking, mapping on the same thread, and a detector of its own.
+    pub parts: Parts,
+}
+
+impl Pipeline {
+    /// Records what `slam` does, which maps on the calling thread or not; `detector_times` are those of its own detector.
+    pub fn new(slam: Slam, maps_inline: bool, detector_times: Option<Receiver<DetectorTime>>) -> Self {
+        Self {
+            slam,
+            stages: Stages::default(),
+            frames: FrameTally::default(),
+            dynamic: DynamicTally::default(),
+            recognition: RecognitionTally::default(),
+            live: Vec::new(),
+            resets: 0,
+            made_keyframe: false,
+            detector_times,
+            parts: Parts::default(),
+            maps_inline,
+            started: Instant::now(),
+            state: TrackingState::default(),
+            best_start: (0, 0),
+        }
+    }
+
+    /// Tracks one frame and returns the state after it; a frame that SLAM refuses is counted as skipped.
+    pub fn track(&mut self, frame: &RgbdFrame) -> TrackingState {
+        let started = Instant::now();
+        let (result, cpu) = cpu::timed(|| self.slam.track(frame));
+        self.made_keyframe = result.as_ref().is_ok_and(|tracked| tracked.is_keyframe);
+        let tracked = match result {
+            Ok(tracked) => tracked,
+            Err(rejected) => {
+                self.skip(Skip { reason: "refused by the tracker", message: rejected.to_string() });
+                return self.state;
+            }
+        };
+        self.log(&tracked);
+        let wall = started.elapsed();
+        self.stages.push("frame", wall);
+        self.count_processor_time(cpu.unwrap_or_default(), wall, &tracked);
+        self.add_stages(&tracked);
+        self.frames.count(tracked.state);
+        self.dynamic.count(&self.slam);
+        self.recognition.count(&tracked);
+        if self.slam.resets() > self.resets {
+            // A new map has another world frame: earlier poses do not belong to this trajectory.
+            self.resets = self.slam.resets();
+            self.live.clear();
+            self.frames.restart();
+        }
+        if let Some(pose) = tracked.t_world_cam {
+            self.live.push(StampedPose { timestamp_ns: tracked.timestamp_ns, pose });
+        } else if self.frames.tracked == 0 {
+            self.update_best_start();
+        }
+        tracked.state
+    }
+
+    /// Counts a frame that cannot be used.
+    pub fn skip(&mut self, skip: Skip) {
+        tracing::info!("skipped {}", skip.message);
+        self.frames.skip(skip);
+    }
+
+    /// Returns the system after the last frame.
+    pub fn slam(&self) -> &Slam {
+        &self.slam
+    }
+
+    /// Counts processor time of the dense map.
+    pub fn add_dense(&mut self, took: Duration) {
+        self.parts.add(Part::Dense, took);
+    }
+
+    /// Returns whether the last frame became a keyframe.
+    pub fn made_keyframe(&self) -> bool {
+        self.made_keyframe
+    }
+
+    /// Returns the counts of frames so far.
+    pub fn frames(&self) -> &FrameTally {
+        &self.frames
+    }
+
+    fn log(&mut self, tracked: &Tracked) {
+        let (frame, time) = (self.frames.total(), format_stamp(tracked.timestamp_ns));
+        if tracked.state != self.state {
+            tracing::info!(frame, %time, before = ?self.state, now = ?tracked.state, "state");
+            self.state = tracked.state;
+        }
+        tracing::debug!(frame, %time, inliers = tracked.inliers, keyframe = tracked.is_keyframe, "frame");
+    }
+
+    fn add_stages(&mut self, tracked: &Tracked) {
+        let times = &tracked.times;
+        self.stages.push("features", times.features);
+        let detections: Vec<_> = self.detector_times.iter().flat_map(Receiver::try_iter).collect();
+        for took in detections {
+            self.stages.push("detector", took.wall);
+            self.parts.add(Part::Detector, took.cpu.unwrap_or_default());
+        }
+        if self.detector_times.is_some() {
+            self.stages.push("detector idle", times.detector_wait);
+        }
+        self.stages.push("dynamic filter", times.dynamic);
+        self.stages.push("tracking", times.tracking);
+        if !times.places.is_zero() {
+            self.stages.push("relocalisation and loops", times.places);
+        }
+        if !times.mapping.is_zero() {
+            self.stages.push("mapping", times.mapping);
+        }
+    }
+
+    /// Divides the processor time of a frame between tracking and mapping in the ratio of their wall times.
+    fn count_processor_time(&mut self, cpu: Duration, wall: Duration, tracked: &Tracked) {
+        let times = &tracked.times;
+        let busy_s = wall.saturating_sub(times.detector_wait).as_secs_f64();
+        let mapping_s = if self.maps_inline { (times.mapping + times.places).as_secs_f64() } else { 0.0 };
+        let mapping = cpu.mul_f64((mapping_s / busy_s.max(1e-9)).clamp(0.0, 1.0));
+        self.parts.add(Part::Mapping, mapping);
+        self.parts.add(Part::Tracking, cpu.saturating_sub(mapping));
+    }
+
+    fn update_best_start(&mut self) {
+        let features = &self.slam.last_frame().features.features;
+        let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
+        self.best_start = self.best_start.max((features.len(), with_depth));
+    }
+
+    /// Encodes the map for a later run.
+    ///
+    /// # Errors
+    /// It cannot be encoded, which would be a fault of this program.
+    pub fn save_map(&mut self) -> Result<Vec<u8>> {
+        self.settle();
+        Ok(self.slam.save_map()?)
+    }
+
+    /// Waits until mapping is finished.
+    pub fn settle(&mut self) {
+        if let (Some(closed), Some(last)) = (self.slam.settle(), self.live.last()) {
+            self.recognition.close(last.timestamp_ns, &closed);
+        }
+    }
+
+    /// Ends the run.
+    ///
+    /// # Errors
+    /// No frame was tracked; the message says why.
+    pub fn finish(mut self, config: &Config) -> Result<Outcome> {
+        self.settle();
+        self.recognition.keyframes_dropped = self.slam.passed_over();
+        let submap_sizes: Vec<usize> = self.slam.trajectories().iter().map(Vec::len).collect();
+        self.recognition.frames_in_other_submaps =
+            submap_sizes.iter().sum::<usize>() - submap_sizes.iter().max().copied().unwrap_or(0);
+        let wall = self.started.elapsed();
+        self.frames.detector_failures = self.slam.detector_failures();
+        if self.frames.tracked == 0 {
+            self.fail(config)?;
+        }
+        let map = self.slam.map();
+        let new_keyframes = map.keyframes().filter(|(_, k)| k.sequence >= self.slam.first_keyframe());
+        let mut keyframes: Vec<_> = new_keyframes.map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
+        keyframes.sort_by_key(|&(sequence, ..)| sequence);
+        let landmark =
+            |l: &yfslam::map::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
+        Ok(Outcome {
+            trajectory: self.slam.trajectory().into_iter().map(stamped).collect(),
+            live: self.live,
+            keyframes: keyframes.into_iter().map(|(_, t, t_cam_world)| stamped((t, t_cam_world.inverse()))).collect(),
+            landmarks: map.landmarks().map(|(_, l)| landmark(l)).collect(),
+            frames: self.frames,
+            dynamic: self.dynamic,
+            recognition: self.recognition,
+            stages: self.stages,
+            wall,
+            parts: self.parts,
+        })
+    }
+
+    /// Returns an error that says why there is no trajectory.
+    fn fail(&self, config: &Config) -> Result<()> {
+        let FrameTally { read, skipped, first_skipped, .. } = &self.frames;
+        if *read == 0 {
+            let first = first_skipped.as_deref().unwrap_or("the sequence has no frames");
+            bail!("no trajectory: none of the {skipped} frames can be used; the first: {first}");
+        }
+        let (features, with_depth) = self.best_start;
+        if config.depth.source == DepthSource::Motion {
+            bail!(
+                "no trajectory: no map could be initialised in {read} frames ({skipped} skipped); the best had {features} features. Without depth \
+                 initialisation needs two frames with {} matches and sideways motion of the camera between them; move it sideways, or \
+                 lower the keys start_* of section monocular in --config",
+                config.monocular.start_min_matches
+            );
+        }
+        bail!(
+            "no trajectory: no map could be initialised in {read} frames ({skipped} skipped); the best had {features} features, \
+             {with_depth} of them static and with depth, but tracking.init_min_features asks for {} and \
+             tracking.init_min_landmarks for {}; check camera and depth factor with `yfslam info`, or lower these in --config",
+            config.tracking.init_min_features,
+            config.tracking.init_min_landmarks
+        );
+    }
+}
+
+fn stamped((timestamp_ns, pose): (i64, Pose)) -> StampedPose {
+    StampedPose { timestamp_ns, pose }
+}
+
+impl Outcome {
+    /// Returns the frames per second of the whole run.
+    pub fn fps(&self) -> f64 {
+        self.frames.total() as f64 / self.wall.as_secs_f64().max(1e-9)
+    }
+}

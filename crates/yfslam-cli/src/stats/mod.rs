@@ -1,0 +1,9 @@
+//! Figures of a run: counts, durations, processor time.
+
+pub mod cpu;
+pub mod process;
+pub mod recognition;
+pub mod skip;
+pub mod stages;
+pub mod tally;
+mod threads;

@@ -1,0 +1,6 @@
+//! HTML pages.
+
+mod dense;
+mod page;
+mod tables;
+pub mod tables_page;
