@@ -3,25 +3,24 @@
 //! ```text
 //! cargo run --release -p yfslam-cli --example dense -- 'walking_xyz?frames=300' --methods none,yf,full
 //! ```
-#![allow(clippy::print_stdout, reason = "tables are what this program is for")]
 
-mod judge;
-mod survey;
-mod thickness;
-mod view;
+mod background_metrics;
+mod dense_run;
+mod ghost_metrics;
+mod wall_thickness;
 
 use anyhow::Result;
-use clap::Parser;
-use judge::{Truth, survey_of_exact_poses};
-use survey::{Taken, Way, take};
-use thickness::thickness;
+use clap::Args;
+use dense_run::{Taken, Way, take};
+use ghost_metrics::{Truth, survey_of_exact_poses};
+use wall_thickness::thickness;
 use yfslam::dense::{DenseConfig, up};
 use yfslam::dynamic::Method;
 use yfslam_eval::{Table, TableStyle};
 use yfslam_synth::{World, parse};
 
-#[derive(Parser)]
-struct Arguments {
+#[derive(Args)]
+pub struct Arguments {
     /// Worlds, such as `walking_xyz?seed=2&frames=300`.
     worlds: Vec<String>,
     /// Methods that keep moving things out.
@@ -38,8 +37,7 @@ struct Arguments {
     resolution: f32,
 }
 
-fn main() -> Result<()> {
-    let arguments = Arguments::parse();
+pub fn run(arguments: Arguments) -> Result<()> {
     let config =
         DenseConfig { resolution_m: arguments.resolution, max_range_m: arguments.max_range, ..Default::default() };
     let mut table = Table::new([
@@ -79,7 +77,7 @@ fn main() -> Result<()> {
             let thick = [&survey, &exact].map(|survey| thickness(survey, &world, &config));
             let exact = exact.volume(&config, &up::of_survey(&survey), |_| {});
             let exact = exact.voxels().filter(|known| known.occupied).count();
-            let views = view::judge(&survey, &volume, &world)?;
+            let views = background_metrics::judge(&survey, &volume, &world)?;
             table.push([
                 spec.clone(),
                 name.clone(),

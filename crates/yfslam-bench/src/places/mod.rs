@@ -12,25 +12,24 @@
 //!
 //! A sequence is a world such as `walking_xyz?seed=2&frames=300`, whose boxes the renderer knows, or a folder in TUM layout with
 //! ground truth, whose people `--detector FILE.onnx` finds.
-#![allow(clippy::print_stdout, reason = "tables are what this program is for")]
 
-mod film;
+mod bag_of_words;
+mod endurance;
+mod false_positives;
 mod live;
+mod loaded_sequence;
 mod loops;
 mod recall;
-mod soak;
-mod strangers;
-mod trials;
-mod words;
+mod relocalisation;
 
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
-use film::Film;
+use clap::{Args, Subcommand};
+use loaded_sequence::Film;
 
-#[derive(Parser)]
-struct Arguments {
+#[derive(Args)]
+pub struct Arguments {
     #[command(subcommand)]
     question: Question,
     /// Worlds, and folders in TUM layout.
@@ -45,7 +44,7 @@ struct Arguments {
 }
 
 #[derive(Subcommand)]
-enum Question {
+pub enum Question {
     /// Which loops are closed, how true they are, and what they are worth; forward, and forward then backward.
     Loops,
     /// Whether a camera that was covered is found again, and how soon.
@@ -79,8 +78,7 @@ enum Question {
     Live,
 }
 
-fn main() -> Result<()> {
-    let arguments = Arguments::parse();
+pub fn run(arguments: Arguments) -> Result<()> {
     let config = match &arguments.config {
         Some(path) => yfslam::Config::from_toml(&std::fs::read_to_string(path)?)?,
         None => yfslam::Config::default(),
@@ -89,10 +87,10 @@ fn main() -> Result<()> {
     match arguments.question {
         Question::Loops => loops::table(&config, arguments.sequences.iter().map(open)),
         Question::Trials { count, seed } => {
-            trials::table(&config, count, seed, arguments.sequences.len(), arguments.sequences.iter().map(open))
+            relocalisation::table(&config, count, seed, arguments.sequences.len(), arguments.sequences.iter().map(open))
         }
-        Question::Soak { rounds } => soak::table(&config, rounds, arguments.sequences.iter().map(open)),
-        Question::Strangers { mapped } => strangers::table(&config, mapped, arguments.sequences.iter().map(open)),
+        Question::Soak { rounds } => endurance::table(&config, rounds, arguments.sequences.iter().map(open)),
+        Question::Strangers { mapped } => false_positives::table(&config, mapped, arguments.sequences.iter().map(open)),
         Question::Recall { mapped } => recall::table(&config, mapped, arguments.sequences.iter().map(open)),
         Question::Live => live::table(&config, arguments.sequences.iter().map(open)),
     }

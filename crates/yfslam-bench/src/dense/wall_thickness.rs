@@ -12,7 +12,7 @@ use yfslam::dense::voxels::{Voxel, voxel_at};
 use yfslam::dense::{DenseConfig, Survey};
 use yfslam_synth::World;
 
-use crate::judge::index_of;
+use super::ghost_metrics::index_of;
 
 /// One patch is asked for in each cube of this side, m.
 const PATCH_M: f32 = 0.1;

@@ -6,7 +6,7 @@ use yfslam::map::persist::decode;
 use yfslam::{Config, MapUse, RgbdFrame};
 use yfslam_eval::{AlignmentKind, StampedPose, align, associate};
 
-use crate::film::Film;
+use super::loaded_sequence::Film;
 
 /// Frames from one that is sought to the next.
 const STEP: usize = 4;

@@ -4,7 +4,7 @@ use anyhow::Result;
 use rustix::time::{ClockId, clock_gettime};
 use yfslam::Config;
 
-use crate::film::Film;
+use super::loaded_sequence::Film;
 
 /// Prints a line for every round through each sequence.
 pub fn table(config: &Config, rounds: usize, films: impl Iterator<Item = Result<Film>>) -> Result<()> {

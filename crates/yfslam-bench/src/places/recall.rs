@@ -11,8 +11,8 @@ use yfslam::loops::Recogniser;
 use yfslam::map::KeyFrameId;
 use yfslam::sensor::SensorModel;
 
-use crate::film::Film;
-use crate::words::{Vocabulary, likeness};
+use super::bag_of_words::{Vocabulary, likeness};
+use super::loaded_sequence::Film;
 
 /// Frames from one that is sought to the next.
 const STEP: usize = 4;

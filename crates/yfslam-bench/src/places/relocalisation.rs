@@ -10,7 +10,7 @@ use yfslam::map::persist::decode;
 use yfslam::{Config, MapUse, Slam, Tracked};
 use yfslam_io::{Fault, FaultInjector, FaultKind};
 
-use crate::film::Film;
+use super::loaded_sequence::Film;
 
 /// How long the camera is covered, s.
 const COVERED_S: [i64; 3] = [1, 5, 20];

@@ -6,7 +6,7 @@ use anyhow::Result;
 use yfslam::map::persist::decode;
 use yfslam::{Config, Execution, MapUse, Slam};
 
-use crate::film::Film;
+use super::loaded_sequence::Film;
 
 /// Prints a line for each sequence.
 pub fn table(config: &Config, films: impl Iterator<Item = Result<Film>>) -> Result<()> {

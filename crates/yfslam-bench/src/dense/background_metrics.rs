@@ -11,7 +11,7 @@ use yfslam::dense::{CellGrid, DenseConfig, Piece, Survey, Volume};
 use yfslam::image::Image;
 use yfslam_synth::World;
 
-use crate::judge::index_of;
+use super::ghost_metrics::index_of;
 
 /// Every so many keyframes a view is judged.
 const EVERY: usize = 3;

@@ -4,7 +4,7 @@ use anyhow::Result;
 use nalgebra::Isometry3;
 use yfslam::{Config, Slam};
 
-use crate::film::Film;
+use super::loaded_sequence::Film;
 
 /// A loop with the error of the motion that was measured between its ends.
 struct Judged {
