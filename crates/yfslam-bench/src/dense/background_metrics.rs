@@ -1,8 +1,8 @@
-//! What the view without people is worth, by the same world in which there are none.
+//! Compares the views without people with the same world in which there are none.
 //!
-//! In: a survey of a world, its volume. Out: how much of what people hide is known, and how near its colours are to the exact ones.
-//! Exposure follows what is in the picture, people or not: the exact picture is brought to the light of the view by one factor a channel,
-//! from what nobody hides.
+//! In: the dense map of a rendered world, its volume, the world. Out: the share of what people hide whose colour is known, and the
+//! distance of these colours from the exact ones. The exposure of an image depends on what it shows, so the exact image is first scaled,
+//! channel by channel, to the brightness of the view where no person hides anything.
 
 use anyhow::Result;
 use nalgebra::{Isometry3, Point3};
@@ -13,25 +13,24 @@ use yfslam_synth::World;
 
 use super::ghost_metrics::index_of;
 
-/// Every so many keyframes a view is judged.
+/// Number of keyframes from one view that is compared to the next.
 const EVERY: usize = 3;
-
-/// Difference in depth up to which a keyframe sees the same surface, m, and as a share of it.
+/// Difference in depth up to which a keyframe shows the same surface, m, and as a share of the depth.
 const SAME_M: f32 = 0.03;
 const SAME_SHARE: f32 = 0.03;
 
-/// What was found, over all views judged.
+/// The comparison over all views.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Views {
+pub struct BackgroundMetrics {
     /// Share of all pixels whose colour is known.
     pub valid: f64,
-    /// The same of what moves hides.
+    /// Share of the pixels hidden by what moves whose colour is known.
     pub filled: f64,
-    /// Share of what moves hides that another keyframe saw, by the exact world: more cannot be filled in.
-    pub shown: f64,
-    /// Peak signal-to-noise ratio of what is known, dB.
+    /// Share of them that another keyframe has seen, by the exact world: more cannot be filled in.
+    pub fillable: f64,
+    /// Peak signal-to-noise ratio of all known pixels, dB.
     pub psnr_db: f64,
-    /// The same of what was filled in.
+    /// The same of the pixels that were filled in.
     pub filled_psnr_db: f64,
 }
 
@@ -53,20 +52,20 @@ impl Error {
     }
 }
 
-/// What a keyframe saw, exactly.
-struct Sight {
+/// The exact view of a keyframe.
+struct ExactView {
     t_world_cam: Isometry3<f32>,
     depth_m: Image<f32>,
     instances: Image<u8>,
 }
 
-impl Sight {
+impl ExactView {
     fn of(world: &World, timestamp_ns: i64) -> Self {
-        let shot = world.frame(index_of(world, timestamp_ns));
-        Self { t_world_cam: shot.t_world_cam.cast(), depth_m: shot.exact_depth, instances: shot.instances }
+        let frame = world.frame(index_of(world, timestamp_ns));
+        Self { t_world_cam: frame.t_world_cam.cast(), depth_m: frame.exact_depth, instances: frame.instances }
     }
 
-    /// Whether a point of the world was seen, with nobody in the way.
+    /// Whether the view shows a point of the world, with no person in front of it.
     fn shows(&self, grid: &CellGrid, point: &Point3<f32>) -> bool {
         let p = self.t_world_cam.inverse_transform_point(point);
         let Some(at) = grid.project(&p) else { return false };
@@ -76,33 +75,34 @@ impl Sight {
     }
 }
 
-/// Judges the views of keyframes.
-pub fn judge(survey: &Survey, volume: &Volume, world: &World) -> Result<Views> {
-    let sights: Vec<Sight> = survey.pieces.iter().map(|one| Sight::of(world, one.timestamp_ns)).collect();
+/// Compares the views of every few keyframes.
+pub fn compare(survey: &Survey, volume: &Volume, world: &World) -> Result<BackgroundMetrics> {
+    let exact_views: Vec<ExactView> = survey.pieces.iter().map(|one| ExactView::of(world, one.timestamp_ns)).collect();
     let mut empty = world.config().clone();
     (empty.people, empty.actors) = (0, Default::default());
     let empty = World::new(&empty)?;
     let config = DenseConfig::default();
     let views = Backgrounds::new(survey, volume, |_| {});
     let (mut all, mut filled) = (Error::default(), Error::default());
-    let (mut cells, mut known, mut hidden, mut hidden_known, mut shown) = (0usize, 0usize, 0usize, 0usize, 0usize);
+    let (mut cells, mut known, mut hidden, mut hidden_known, mut fillable) = (0usize, 0usize, 0usize, 0usize, 0usize);
     for (number, one) in survey.pieces.iter().enumerate().step_by(EVERY) {
-        let shot = empty.frame(index_of(&empty, one.timestamp_ns));
-        let exact = Piece::cut(&config, &survey.grid, &shot.frame.color, &shot.frame.depth, |_, _| false);
+        let frame = empty.frame(index_of(&empty, one.timestamp_ns));
+        let exact = Piece::cut(&config, &survey.grid, &frame.frame.color, &frame.frame.depth, |_, _| false);
         let Some(view) = views.of_piece(number) else { continue };
-        let mut light = [[0.0f64; 3]; 2];
+        let mut brightness = [[0.0f64; 3]; 2];
         for cell in (0..view.valid.data().len()).filter(|cell| !one.piece.moves(*cell)) {
-            for (sums, rgb) in light.iter_mut().zip([view.color.data()[cell], exact.color(cell)]) {
+            for (sums, rgb) in brightness.iter_mut().zip([view.color.data()[cell], exact.color(cell)]) {
                 sums.iter_mut().zip(rgb).for_each(|(sum, v)| *sum += f64::from(v));
             }
         }
-        let gain = [0, 1, 2].map(|channel| light[0][channel] / light[1][channel].max(1.0));
-        let is_shown = |cell: usize| {
+        let gain = [0, 1, 2].map(|channel| brightness[0][channel] / brightness[1][channel].max(1.0));
+        let is_fillable = |cell: usize| {
             let (columns, stride) = (survey.grid.columns(), survey.grid.stride_px());
-            let z = shot.exact_depth.get(cell % columns * stride, cell / columns * stride).copied().unwrap_or_default();
+            let z =
+                frame.exact_depth.get(cell % columns * stride, cell / columns * stride).copied().unwrap_or_default();
             let [x, y] = survey.grid.rays()[cell];
-            let point = shot.t_world_cam.cast() * Point3::new(x * z, y * z, z);
-            sights.iter().enumerate().any(|(other, sight)| other != number && sight.shows(&survey.grid, &point))
+            let point = frame.t_world_cam.cast() * Point3::new(x * z, y * z, z);
+            exact_views.iter().enumerate().any(|(other, view)| other != number && view.shows(&survey.grid, &point))
         };
         for (cell, &valid) in view.valid.data().iter().enumerate() {
             let moves = one.piece.moves(cell);
@@ -110,7 +110,7 @@ pub fn judge(survey: &Survey, volume: &Volume, world: &World) -> Result<Views> {
             known += usize::from(valid);
             hidden += usize::from(moves);
             hidden_known += usize::from(moves && valid);
-            shown += usize::from(moves && is_shown(cell));
+            fillable += usize::from(moves && is_fillable(cell));
             if valid {
                 let rgb = exact.color(cell);
                 let rgb = [0, 1, 2].map(|channel| (f64::from(rgb[channel]) * gain[channel]).min(255.0));
@@ -122,10 +122,10 @@ pub fn judge(survey: &Survey, volume: &Volume, world: &World) -> Result<Views> {
         }
     }
     let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
-    Ok(Views {
+    Ok(BackgroundMetrics {
         valid: share(known, cells),
         filled: share(hidden_known, hidden),
-        shown: share(shown, hidden),
+        fillable: share(fillable, hidden),
         psnr_db: all.psnr_db(),
         filled_psnr_db: filled.psnr_db(),
     })

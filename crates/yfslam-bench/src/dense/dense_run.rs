@@ -1,4 +1,4 @@
-//! Takes a synthetic world through SLAM with a dense map.
+//! SLAM with a dense map on a rendered world.
 
 use std::time::Instant;
 
@@ -12,26 +12,25 @@ use yfslam_synth::{CLASS_NAMES, World};
 /// Frames that are rendered at once.
 const BATCH: usize = 32;
 
-/// How a world is taken.
+/// The settings of a run.
 #[derive(Clone, Copy, Debug)]
-pub struct Way {
-    /// What keeps moving things out.
+pub struct RunOptions {
     pub method: Method,
     /// Whether loops are closed.
     pub loops: bool,
 }
 
-/// What came of it.
-pub struct Taken {
+/// The dense map of a run and what it took.
+pub struct DenseRun {
     pub survey: Survey,
-    /// Wall time for each keyframe, ms: piece and volume.
-    pub each_ms: f64,
-    /// Memory of pieces and volume at the end.
+    /// Wall time for each keyframe that became a keyframe patch, ms.
+    pub ms_per_keyframe: f64,
+    /// Memory of keyframe patches and volume at the end.
     pub bytes: usize,
 }
 
-/// A system at work.
-struct Taker {
+/// A run under way.
+struct Runner {
     config: Config,
     slam: Slam,
     mapper: DenseMapper,
@@ -40,31 +39,31 @@ struct Taker {
     resets: usize,
 }
 
-/// The dense maps of a world taken in several ways, as `yfslam run --dense` makes them. Each frame is rendered once.
-pub fn take(world: &World, ways: &[Way], dense: &DenseConfig) -> Result<Vec<Taken>> {
-    let mut takers = ways.iter().map(|way| Taker::new(*way, world, dense)).collect::<Result<Vec<_>>>()?;
+/// Takes a world through SLAM with several settings, as `yfslam run --dense` does. Each frame is rendered once.
+pub fn run_all(world: &World, options: &[RunOptions], dense: &DenseConfig) -> Result<Vec<DenseRun>> {
+    let mut runners = options.iter().map(|options| Runner::new(*options, world, dense)).collect::<Result<Vec<_>>>()?;
     for start in (0..world.len()).step_by(BATCH) {
-        let shoot = |index| world.frame(index).frame;
-        let frames: Vec<RgbdFrame> = (start..(start + BATCH).min(world.len())).into_par_iter().map(shoot).collect();
-        for taker in &mut takers {
-            frames.iter().try_for_each(|frame| taker.see(frame.clone()))?;
+        let render = |index| world.frame(index).frame;
+        let frames: Vec<RgbdFrame> = (start..(start + BATCH).min(world.len())).into_par_iter().map(render).collect();
+        for runner in &mut runners {
+            frames.iter().try_for_each(|frame| runner.track(frame.clone()))?;
         }
     }
-    Ok(takers.into_iter().map(Taker::finish).collect())
+    Ok(runners.into_iter().map(Runner::finish).collect())
 }
 
-impl Taker {
-    fn new(way: Way, world: &World, dense: &DenseConfig) -> Result<Self> {
+impl Runner {
+    fn new(options: RunOptions, world: &World, dense: &DenseConfig) -> Result<Self> {
         let mut config = Config::default();
-        config.dynamic.method = way.method;
-        config.loops.enabled = way.loops;
+        config.dynamic.method = options.method;
+        config.loops.enabled = options.loops;
         let camera = &world.config().camera;
         let slam = Slam::new(config.clone(), camera, None)?;
         let mapper = DenseMapper::new(dense, camera, Execution::Inline)?;
         Ok(Self { config, slam, mapper, seconds: 0.0, keyframes: 0, resets: 0 })
     }
 
-    fn see(&mut self, mut frame: RgbdFrame) -> Result<()> {
+    fn track(&mut self, mut frame: RgbdFrame) -> Result<()> {
         let movable = |class: usize| self.config.dynamic.movable.iter().any(|name| name == CLASS_NAMES[class]);
         frame.detections.iter_mut().for_each(|boxes| boxes.retain(|b| movable(b.class)));
         let Self { slam, mapper, .. } = self;
@@ -73,22 +72,22 @@ impl Taker {
             self.resets = slam.resets();
             mapper.clear();
         }
-        let Some(tie) = slam.last_frame().reference.filter(|_| tracked.is_keyframe) else { return Ok(()) };
+        let Some(anchor) = slam.last_frame().reference.filter(|_| tracked.is_keyframe) else { return Ok(()) };
         if mapper.is_due(frame.timestamp_ns, &slam.last_frame().t_cam_world.inverse()) {
             let started = Instant::now();
             let moving = slam.moving_mask(&frame.depth);
-            let piece = mapper.cut(&frame.color, &frame.depth, |at, edge| moving.covers(&frame.depth, at, edge));
-            mapper.hang(frame.timestamp_ns, tie, piece, slam.map());
+            let patch = mapper.cut(&frame.color, &frame.depth, |at, edge| moving.covers(&frame.depth, at, edge));
+            mapper.hang(frame.timestamp_ns, anchor, patch, slam.map());
             self.seconds += started.elapsed().as_secs_f64();
             self.keyframes += 1;
         }
         Ok(())
     }
 
-    fn finish(mut self) -> Taken {
+    fn finish(mut self) -> DenseRun {
         let map = self.slam.map();
         let bytes = self.mapper.bytes() + self.mapper.volume(map).bytes();
-        let each_ms = self.seconds * 1e3 / self.keyframes.max(1) as f64;
-        Taken { survey: self.mapper.into_survey(map), each_ms, bytes }
+        let ms_per_keyframe = self.seconds * 1e3 / self.keyframes.max(1) as f64;
+        DenseRun { survey: self.mapper.into_survey(map), ms_per_keyframe, bytes }
     }
 }

@@ -1,11 +1,11 @@
-//! A bag of words with a trained vocabulary, to compare recognition without one with: a tree of cluster centres in Hamming space, and
-//! the likeness of two pictures by the words that they share (Gálvez-López and Tardós, Bags of Binary Words, IEEE T-RO 2012).
+//! A bag of words with a trained vocabulary, for comparison with place recognition without one: a tree of cluster centres in Hamming
+//! space, and the similarity of two images by the words that they share (Gálvez-López and Tardós, Bags of Binary Words, IEEE T-RO 2012).
 
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use yfslam::features::Descriptor;
 
-/// Children of a node.
+/// Number of children of a node.
 const BRANCHES: usize = 10;
 /// Levels of the tree; 10⁵ words at most.
 const LEVELS: usize = 5;
@@ -15,7 +15,7 @@ const ROUNDS: usize = 5;
 /// A tree of words.
 pub struct Vocabulary {
     nodes: Vec<Node>,
-    /// Inverse document frequency of each word; 0 for nodes that are none.
+    /// Inverse document frequency of each word; 0 for nodes that are not words.
     weights: Vec<f64>,
 }
 
@@ -25,23 +25,23 @@ struct Node {
     children: Vec<usize>,
 }
 
-/// The words of a picture, ascending, with weights that sum to 1.
+/// The words of an image, ascending, with weights that sum to 1.
 pub type Words = Vec<(usize, f64)>;
 
 impl Vocabulary {
-    /// Trains on the descriptors of some pictures.
-    pub fn train(pictures: &[Vec<Descriptor>]) -> Self {
+    /// Trains on the descriptors of some images.
+    pub fn train(images: &[Vec<Descriptor>]) -> Self {
         let mut tree = Self { nodes: vec![Node::default()], weights: Vec::new() };
-        let all = pictures.iter().flatten().copied().collect();
+        let all = images.iter().flatten().copied().collect();
         tree.split(0, all, 1, &mut Pcg64Mcg::seed_from_u64(0));
         let mut seen_in = vec![0usize; tree.nodes.len()];
-        for picture in pictures {
-            let mut words: Vec<usize> = picture.iter().map(|d| tree.word(d)).collect();
+        for image in images {
+            let mut words: Vec<usize> = image.iter().map(|d| tree.word(d)).collect();
             words.sort_unstable();
             words.dedup();
             words.into_iter().for_each(|word| seen_in[word] += 1);
         }
-        let idf = |n: &usize| if *n > 0 { (pictures.len() as f64 / *n as f64).ln() } else { 0.0 };
+        let idf = |n: &usize| if *n > 0 { (images.len() as f64 / *n as f64).ln() } else { 0.0 };
         tree.weights = seen_in.iter().map(idf).collect();
         tree
     }
@@ -51,7 +51,7 @@ impl Vocabulary {
         self.nodes.iter().filter(|node| node.children.is_empty()).count()
     }
 
-    /// The words of a picture.
+    /// The words of an image.
     pub fn words(&self, descriptors: &[Descriptor]) -> Words {
         let mut found: Vec<usize> = descriptors.iter().map(|d| self.word(d)).collect();
         found.sort_unstable();
@@ -62,7 +62,7 @@ impl Vocabulary {
         words
     }
 
-    /// The leaf that a descriptor falls to.
+    /// The leaf of a descriptor.
     fn word(&self, descriptor: &Descriptor) -> usize {
         let mut at = 0;
         while let Some(&next) =
@@ -73,7 +73,7 @@ impl Vocabulary {
         at
     }
 
-    /// Clusters what falls to a node, by k-majority, and goes on with the clusters.
+    /// Clusters the descriptors of a node by k-majority, and continues with the clusters.
     fn split(&mut self, node: usize, members: Vec<Descriptor>, level: usize, rng: &mut Pcg64Mcg) {
         if members.len() <= BRANCHES || level > LEVELS {
             return;
@@ -105,8 +105,8 @@ impl Vocabulary {
     }
 }
 
-/// Likeness of two pictures, in [0, 1]: one less half the sum of differences.
-pub fn likeness(a: &Words, b: &Words) -> f64 {
+/// Similarity of two images, in [0, 1]: 1 minus half of the sum of the differences.
+pub fn similarity(a: &Words, b: &Words) -> f64 {
     let (mut i, mut j, mut shared) = (0, 0, 0.0);
     while let (Some(p), Some(q)) = (a.get(i), b.get(j)) {
         if p.0 == q.0 {

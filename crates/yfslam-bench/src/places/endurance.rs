@@ -1,56 +1,65 @@
-//! A room that is visited for long: whether keyframes, memory and time stay flat.
+//! A room that is visited for long: keyframes, memory and time, round by round.
 
 use anyhow::Result;
-use rustix::time::{ClockId, clock_gettime};
 use yfslam::Config;
 
-use super::loaded_sequence::Film;
+use super::sequence::LoadedSequence;
+use crate::row::Row;
 
-/// Prints a line for every round through each sequence.
-pub fn table(config: &Config, rounds: usize, films: impl Iterator<Item = Result<Film>>) -> Result<()> {
-    for film in films {
-        let film = film?;
-        println!("{}, {} frames a round", film.name, film.len() - 1);
-        println!(
-            "| round | keyframes | landmarks | process, MB | CPU per frame, median ms | 99 % ms | lost | ATE of the round, m |"
-        );
-        println!("|---|---|---|---|---|---|---|---|");
-        let mut slam = film.slam(config)?;
+/// One row for each round through each sequence.
+pub fn measure(
+    config: &Config,
+    rounds: usize,
+    sequences: impl Iterator<Item = Result<LoadedSequence>>,
+) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    for sequence in sequences {
+        let sequence = sequence?;
+        let length = sequence.len() - 1;
+        let mut slam = sequence.slam(config)?;
         for round in 0..rounds {
-            let shown = round * (film.len() - 1)..(round + 1) * (film.len() - 1);
-            let (mut times, mut lost, mut live) = (Vec::new(), 0, Vec::new());
-            for shown in shown {
-                let frame = film.show(shown);
-                let started = processor_ms();
+            let (mut times, mut lost, mut live) = (Vec::new(), 0usize, Vec::new());
+            for played in round * length..(round + 1) * length {
+                let frame = sequence.play(played);
+                let started = thread_ms();
                 let tracked = slam.track(&frame)?;
-                times.push(processor_ms() - started);
+                times.push(thread_ms() - started);
                 lost += usize::from(tracked.t_world_cam.is_none());
                 live.extend(tracked.t_world_cam.map(|pose| (tracked.timestamp_ns, pose)));
             }
             times.sort_by(f64::total_cmp);
-            println!(
-                "| {} | {} | {} | {:.1} | {:.2} | {:.1} | {lost} | {:.4} |",
-                round + 1,
-                slam.map().keyframe_count(),
-                slam.map().landmark_count(),
-                resident_mb(),
-                times[times.len() / 2],
-                times[times.len() * 99 / 100],
-                film.ate_m(&live)?,
+            rows.push(
+                Row::new()
+                    .case("sequence", &sequence.name)
+                    .case("round", round + 1)
+                    .figure("frames", length)
+                    .figure("lost", lost)
+                    .figure("keyframes", slam.map().keyframe_count())
+                    .figure("landmarks", slam.map().landmark_count())
+                    .figure("process_mb", resident_mb())
+                    .figure("frame_median_ms", times[times.len() / 2])
+                    .figure("frame_p99_ms", times[times.len() * 99 / 100])
+                    .figure("ate_live_m", sequence.ate_m(&live)?),
             );
         }
         slam.map().validate().map_err(anyhow::Error::msg)?;
     }
-    Ok(())
+    Ok(rows)
 }
 
-/// Processor time of this thread, which other work on the machine does not spoil.
-fn processor_ms() -> f64 {
-    let time = clock_gettime(ClockId::ThreadCPUTime);
+/// Processor time of this thread, ms: other work on the machine does not count.
+#[cfg(unix)]
+fn thread_ms() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
 }
 
-/// Memory that this process holds, the film included; 0 where the system does not tell.
+#[cfg(not(unix))]
+fn thread_ms() -> f64 {
+    f64::NAN
+}
+
+/// Resident memory of this process, with the sequence that it holds, MB; 0 where the system does not tell.
 fn resident_mb() -> f64 {
     let pages = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
     let pages: f64 = pages.split(' ').nth(1).and_then(|pages| pages.parse().ok()).unwrap_or_default();

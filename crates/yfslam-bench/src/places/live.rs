@@ -1,4 +1,5 @@
-//! A live camera: frames at 30 Hz with mapping on its own thread, beside the same frames one after another; the start; the saved map.
+//! A live camera: frames at their own rate with mapping on a thread of its own, beside the same frames one after another; the time to
+//! the first pose; localisation in the saved map.
 
 use std::time::{Duration, Instant};
 
@@ -6,50 +7,53 @@ use anyhow::Result;
 use yfslam::map::persist::decode;
 use yfslam::{Config, Execution, MapUse, Slam};
 
-use super::loaded_sequence::Film;
+use super::sequence::LoadedSequence;
+use crate::row::Row;
 
-/// Prints a line for each sequence.
-pub fn table(config: &Config, films: impl Iterator<Item = Result<Film>>) -> Result<()> {
-    println!(
-        "| sequence | ATE inline, m | ATE at 30 Hz, m | frame, median / 99 % / worst, ms | passed over | first pose, ms | ATE in the saved map, m | of inline |"
-    );
-    println!("|---|---|---|---|---|---|---|---|");
-    for film in films {
-        let film = film?;
+/// One row for each sequence.
+pub fn measure(config: &Config, sequences: impl Iterator<Item = Result<LoadedSequence>>) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    for sequence in sequences {
+        let sequence = sequence?;
         let begun = Instant::now();
-        let mut inline = film.slam(config)?;
-        let (_, first) = play(&film, &mut inline, None, begun)?;
-        let ate = film.ate_m(&inline.trajectory())?;
-        let mut live = film.slam(config)?.with_execution(Execution::Threaded)?;
-        let (mut times, _) =
-            play(&film, &mut live, Some(Duration::from_nanos(film.period_ns() as u64)), Instant::now())?;
+        let mut inline = sequence.slam(config)?;
+        let (_, first) = run(&sequence, &mut inline, None, begun)?;
+        let mut live = sequence.slam(config)?.with_execution(Execution::Threaded)?;
+        let period = Duration::from_nanos(sequence.period_ns() as u64);
+        let (mut times, _) = run(&sequence, &mut live, Some(period), Instant::now())?;
         times.sort_by(f64::total_cmp);
-        let mut localised = film.slam(config)?.with_map(decode(&inline.save_map()?)?, MapUse::Localise)?;
-        play(&film, &mut localised, None, Instant::now())?;
-        let again = film.ate_m(&localised.trajectory())?;
-        println!(
-            "| {} | {ate:.4} | {:.4} | {:.1} / {:.1} / {:.1} | {} | {:.1} | {again:.4} | {:.2} |",
-            film.name,
-            film.ate_m(&live.trajectory())?,
-            times[times.len() / 2],
-            times[times.len() * 99 / 100],
-            times[times.len() - 1],
-            live.passed_over(),
-            first.unwrap_or_default().as_secs_f64() * 1e3,
-            again / ate,
+        let mut localised = sequence.slam(config)?.with_map(decode(&inline.save_map()?)?, MapUse::Localise)?;
+        run(&sequence, &mut localised, None, Instant::now())?;
+        rows.push(
+            Row::new()
+                .case("sequence", &sequence.name)
+                .figure("ate_inline_m", sequence.ate_m(&inline.trajectory())?)
+                .figure("ate_live_m", sequence.ate_m(&live.trajectory())?)
+                .figure("ate_localised_m", sequence.ate_m(&localised.trajectory())?)
+                .figure("frame_median_ms", times[times.len() / 2])
+                .figure("frame_p99_ms", times[times.len() * 99 / 100])
+                .figure("frame_max_ms", times[times.len() - 1])
+                .figure("keyframes_skipped", live.passed_over())
+                .figure("first_pose_ms", first.unwrap_or_default().as_secs_f64() * 1e3),
         );
     }
-    Ok(())
+    Ok(rows)
 }
 
-/// Tracks the film forward, at a pace if one is given. Returns the time each frame took, ms, and the time from `begun` to the first pose.
-fn play(film: &Film, slam: &mut Slam, pace: Option<Duration>, begun: Instant) -> Result<(Vec<f64>, Option<Duration>)> {
+/// Tracks the sequence forward, at a rate if one is given. Returns the time of each frame, ms, and the time from `begun` to the first
+/// pose.
+fn run(
+    sequence: &LoadedSequence,
+    slam: &mut Slam,
+    period: Option<Duration>,
+    begun: Instant,
+) -> Result<(Vec<f64>, Option<Duration>)> {
     let (mut times, mut first) = (Vec::new(), None);
     let start = Instant::now();
-    for shown in 0..film.len() {
-        let frame = film.show(shown);
-        if let Some(pace) = pace {
-            std::thread::sleep((start + pace * shown as u32).saturating_duration_since(Instant::now()));
+    for played in 0..sequence.len() {
+        let frame = sequence.play(played);
+        if let Some(period) = period {
+            std::thread::sleep((start + period * played as u32).saturating_duration_since(Instant::now()));
         }
         let asked = Instant::now();
         let tracked = slam.track(&frame)?;

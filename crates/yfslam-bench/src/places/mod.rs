@@ -1,97 +1,109 @@
-//! What the back end is worth, in tables: loops, finding back, long runs, live runs. Sequences are held in memory and played forward
-//! and backward, as often as a question asks for.
+//! Experiments on loop closing, relocalisation, long runs and live runs. Sequences are held in memory and played forward and backward,
+//! as often as an experiment needs.
 //!
-//! ```text
-//! cargo run --release -p yfslam-cli --example places -- loops corridor_loop walking_xyz DATA/rgbd/tum_fr1_xyz_dev
-//! cargo run --release -p yfslam-cli --example places -- trials --count 200 SEQUENCE...
-//! cargo run --release -p yfslam-cli --example places -- soak --rounds 20 SEQUENCE
-//! cargo run --release -p yfslam-cli --example places -- strangers corridor_loop
-//! cargo run --release -p yfslam-cli --example places -- recall --mapped 0.3 corridor_loop
-//! cargo run --release -p yfslam-cli --example places -- live SEQUENCE...
-//! ```
-//!
-//! A sequence is a world such as `walking_xyz?seed=2&frames=300`, whose boxes the renderer knows, or a folder in TUM layout with
-//! ground truth, whose people `--detector FILE.onnx` finds.
+//! A sequence is a world such as `walking_xyz?seed=2&frames=300`, whose boxes come from the renderer, or a folder in TUM layout with
+//! ground truth, whose people are found by the network.
 
 mod bag_of_words;
 mod endurance;
 mod false_positives;
 mod live;
-mod loaded_sequence;
 mod loops;
 mod recall;
 mod relocalisation;
+mod sequence;
 
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
-use loaded_sequence::Film;
+use nalgebra::Isometry3;
+use sequence::LoadedSequence;
 
-#[derive(Args)]
+use crate::row::Row;
+
+/// What is measured.
+#[derive(Args, Clone, Debug)]
 pub struct Arguments {
     #[command(subcommand)]
-    question: Question,
+    /// The experiment.
+    pub experiment: Experiment,
     /// Worlds, and folders in TUM layout.
     #[arg(global = true)]
-    sequences: Vec<String>,
-    /// Network that finds people in recorded folders: YOLO-FastestV2 as ONNX.
+    pub sequences: Vec<String>,
+    /// Network for recorded folders: YOLO-FastestV2 as ONNX [default: the embedded one].
     #[arg(long, global = true)]
-    detector: Option<PathBuf>,
-    /// Settings that differ from the defaults.
+    pub detector: Option<PathBuf>,
+    /// Configuration that differs from the defaults.
     #[arg(long, global = true)]
-    config: Option<PathBuf>,
+    pub config: Option<PathBuf>,
 }
 
-#[derive(Subcommand)]
-pub enum Question {
-    /// Which loops are closed, how true they are, and what they are worth; forward, and forward then backward.
+/// An experiment.
+#[derive(Clone, Debug, Subcommand)]
+pub enum Experiment {
+    /// Loops that are closed, their errors, and the trajectory error with and without them; forward, and forward then backward.
     Loops,
-    /// Whether a camera that was covered is found again, and how soon.
-    Trials {
+    /// A camera that is covered for a while: the number of frames until it is relocalised.
+    Relocalisation {
         /// Trials over all sequences.
         #[arg(long, default_value_t = 200)]
         count: usize,
-        /// Of the moments at which the camera is covered.
+        /// Seed of the moments at which the camera is covered.
         #[arg(long, default_value_t = 0)]
         seed: u64,
     },
-    /// Whether keyframes, memory and time stay flat while a sequence is played to and fro.
-    Soak {
-        /// Times that it is played, forward and backward counted apart.
+    /// Keyframes, memory and time while a sequence is played to and fro.
+    Endurance {
+        /// Number of times that it is played, forward and backward counted apart.
         #[arg(long, default_value_t = 20)]
         rounds: usize,
     },
-    /// Whether places that are not in the map are taken for places that are: the first part is mapped, the whole is sought in it.
-    Strangers {
+    /// Places that are not in the map and are taken for places that are: the first part is mapped, all of it is relocalised.
+    FalsePositives {
         /// Share of the sequence that is mapped.
         #[arg(long, default_value_t = 0.45)]
         mapped: f64,
     },
-    /// How many places are recognised without a single error, beside a bag of words trained on the same map.
+    /// Places that are recognised without a single error, beside a bag of words that was trained on the same map.
     Recall {
         /// Share of the sequence that is mapped.
         #[arg(long, default_value_t = 0.5)]
         mapped: f64,
     },
-    /// A live camera: frames at 30 Hz, mapping on its own thread; start-up; localisation in the saved map.
+    /// A live camera: frames at their own rate with mapping on a thread, the time to the first pose, localisation in the saved map.
     Live,
 }
 
-pub fn run(arguments: Arguments) -> Result<()> {
+/// Runs an experiment: one row for each line of its table.
+///
+/// # Errors
+/// A sequence cannot be opened, or SLAM refuses its input.
+pub fn measure(arguments: &Arguments) -> Result<Vec<Row>> {
     let config = match &arguments.config {
         Some(path) => yfslam::Config::from_toml(&std::fs::read_to_string(path)?)?,
         None => yfslam::Config::default(),
     };
-    let open = |spec: &String| Film::open(spec, arguments.detector.as_deref(), &config);
-    match arguments.question {
-        Question::Loops => loops::table(&config, arguments.sequences.iter().map(open)),
-        Question::Trials { count, seed } => {
-            relocalisation::table(&config, count, seed, arguments.sequences.len(), arguments.sequences.iter().map(open))
+    let open = |spec: &String| LoadedSequence::open(spec, arguments.detector.as_deref(), &config);
+    let sequences = arguments.sequences.iter().map(open);
+    match arguments.experiment {
+        Experiment::Loops => loops::measure(&config, sequences),
+        Experiment::Relocalisation { count, seed } => {
+            relocalisation::measure(&config, count, seed, arguments.sequences.len(), sequences)
         }
-        Question::Soak { rounds } => endurance::table(&config, rounds, arguments.sequences.iter().map(open)),
-        Question::Strangers { mapped } => false_positives::table(&config, mapped, arguments.sequences.iter().map(open)),
-        Question::Recall { mapped } => recall::table(&config, mapped, arguments.sequences.iter().map(open)),
-        Question::Live => live::table(&config, arguments.sequences.iter().map(open)),
+        Experiment::Endurance { rounds } => endurance::measure(&config, rounds, sequences),
+        Experiment::FalsePositives { mapped } => false_positives::measure(&config, mapped, sequences),
+        Experiment::Recall { mapped } => recall::measure(&config, mapped, sequences),
+        Experiment::Live => live::measure(&config, sequences),
     }
+}
+
+/// Translation and rotation of a difference between poses, m and degrees.
+fn size(error: &Isometry3<f64>) -> (f64, f64) {
+    (error.translation.vector.norm(), error.rotation.angle().to_degrees())
+}
+
+/// Whether an error of a pose or a loop is that of another place: more than 0.3 m or 10°.
+fn is_wrong((m, deg): (f64, f64)) -> bool {
+    m > 0.3 || deg > 10.0
 }

@@ -1,0 +1,142 @@
+//! What a frame costs: the processor time of the whole process as the operating system counts it, and the parts that `run.json` tells.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use serde_json::Value;
+
+use super::recordings::RECORDINGS;
+use super::{Job, Setup, Topic, runs};
+use crate::program::read_run;
+use crate::record::Record;
+use crate::render::{Spread, Table, number, one_state, select, values};
+use crate::row::Row;
+use crate::trajectories::{Part, frame_count};
+
+/// The topic.
+pub const TOPIC: Topic = Topic { name: "cost", title: "Processor time and memory", minutes: 3, jobs, page };
+
+const METHODS: [&str; 2] = ["none", "full"];
+const ROUNDS: usize = 3;
+
+fn jobs(setup: &Setup) -> Result<Vec<Job>> {
+    let mut jobs = Vec::new();
+    // Methods and recordings take turns, so that all of them see the same load.
+    for round in 1..=setup.pick(ROUNDS, 1) {
+        for (name, folder) in setup.recordings(&RECORDINGS) {
+            for method in METHODS {
+                let (name, folder) = (name.to_owned(), folder.clone());
+                jobs.push(Job::new(format!("{name}, {method}, round {round}"), move |setup| {
+                    let out = setup.program.out.join("run");
+                    let part = Part { start: 0, frames: setup.quick.then_some(60), backward: false };
+                    let words = [
+                        "run",
+                        &runs::text(&folder)?,
+                        "--method",
+                        method,
+                        "--detector",
+                        "embedded",
+                        "--quiet",
+                        "--out",
+                    ];
+                    let mut arguments: Vec<String> = words.map(str::to_owned).to_vec();
+                    arguments.push(runs::text(&out)?);
+                    arguments.extend(part.arguments(frame_count(&folder)?));
+                    let (_, usage) = setup.program.run(&arguments)?;
+                    let run = read_run(&out)?;
+                    let frames = runs::number(&run, "/frames/read").unwrap_or_default().max(1.0);
+                    let row = Row::new()
+                        .case("sequence", &name)
+                        .case("method", method)
+                        .case("round", round)
+                        .figure("process_ms_per_frame", 1e3 * usage.processor_s / frames)
+                        .figure("peak_mb", usage.peak_mb)
+                        .figure("wall_ms_per_frame", runs::number(&run, "/wall_s").map(|wall_s| 1e3 * wall_s / frames))
+                        .figure("cpu_s_ms_per_frame", runs::number(&run, "/cpu_s").map(|cpu_s| 1e3 * cpu_s / frames))
+                        .figure("parts_ms_per_frame", parts(&run, frames))
+                        .figure("stages_median_ms", stages(&run));
+                    Ok((setup.program.command(&arguments), vec![row]))
+                }));
+            }
+        }
+    }
+    Ok(jobs)
+}
+
+/// Processor time of each part of the process for a frame, where `run.json` has it, ms.
+fn parts(run: &Value, frames: f64) -> Value {
+    let keys = ["/processor_s", "/cpu_parts_s", "/cpu"];
+    let Some(parts) = keys.iter().find_map(|key| run.pointer(key)?.as_object()) else { return Value::Null };
+    let of_frame = |(key, value): (&String, &Value)| {
+        Some((key.trim_end_matches("_s").to_owned(), Value::from(1e3 * value.as_f64()? / frames)))
+    };
+    Value::Object(parts.iter().filter_map(of_frame).collect())
+}
+
+/// Median wall time of each stage, ms.
+fn stages(run: &Value) -> Value {
+    let stages = run.pointer("/times").and_then(Value::as_object).into_iter().flatten();
+    let median = |(name, stage): (&String, &Value)| Some((name.clone(), stage.get("median_ms")?.clone()));
+    Value::Object(stages.filter_map(median).collect())
+}
+
+/// The spread of each entry of a figure that is itself a table of figures.
+fn nested(rows: &[&Record], key: &str) -> BTreeMap<String, Spread> {
+    let mut found: BTreeMap<String, Vec<Option<f64>>> = BTreeMap::new();
+    for entries in rows.iter().filter_map(|record| record.figures.get(key)?.as_object()) {
+        for (name, value) in entries {
+            found.entry(name.clone()).or_default().push(value.as_f64());
+        }
+    }
+    found.into_iter().filter_map(|(name, values)| Some((name, Spread::of(values)?))).collect()
+}
+
+fn page(records: &[&Record]) -> Result<String> {
+    one_state(records.iter().copied())?;
+    let mut whole = Table::new([
+        "sequence",
+        "method",
+        "whole process, ms a frame",
+        "counted by `run.json` (`cpu_s`), ms a frame",
+        "wall, ms a frame",
+        "peak memory, MB",
+    ]);
+    let mut parts = Table::new(["sequence", "method", "part", "ms a frame", "share of the process"]);
+    let mut stages = Table::new(["sequence", "method", "stage", "wall, median, ms"]);
+    for sequence in values(records, "sequence") {
+        for method in values(records, "method") {
+            let rows = select(records, &[("sequence", sequence), ("method", method)]);
+            let spread = |key: &str| Spread::of(rows.iter().map(|record| record.figure(key)));
+            let process = spread("process_ms_per_frame");
+            whole.row([
+                sequence.to_owned(),
+                method.to_owned(),
+                Spread::text(process, 1),
+                Spread::middle(spread("cpu_s_ms_per_frame"), 1),
+                Spread::middle(spread("wall_ms_per_frame"), 1),
+                Spread::middle(spread("peak_mb"), 0),
+            ]);
+            for (part, spread) in nested(&rows, "parts_ms_per_frame") {
+                let share = process.map(|process| 100.0 * spread.median / process.median);
+                let share = number(share, 0) + " %";
+                parts.row([sequence, method, &part, &number(Some(spread.median), 2), &share]);
+            }
+            for (stage, spread) in nested(&rows, "stages_median_ms") {
+                stages.row([sequence, method, &stage, &number(Some(spread.median), 2)]);
+            }
+        }
+    }
+    let mut text = format!(
+        "The processor time of the whole process, user and system, of all its threads, as the operating system accounts for it at the end of \
+         the process, divided by the frames: start, decoding, detection, tracking, mapping, writing the results. Three runs of each, in turns; \
+         median, least and greatest. Compare these figures only with others of the same machine.\n\n{whole}"
+    );
+    if !parts.is_empty() {
+        text += &format!("\n## Parts of the process\n\nProcessor time as `run.json` counts it.\n\n{parts}");
+    }
+    Ok(text
+        + &format!(
+            "\n## Stages\n\nWall time as `run.json` tells it; the median over the frames, or over the keyframes for mapping. Decoding runs on \
+             other threads than the rest.\n\n{stages}"
+        ))
+}
