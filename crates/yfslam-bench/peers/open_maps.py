@@ -3,7 +3,7 @@
 
     pip install open3d trimesh pypcd4 plyfile pillow pyyaml numpy     (and Debian's octomap-tools)
     yfslam run SEQUENCE --dense --out RUN
-    python3 benches/open_maps.py --yfslam target/release/yfslam RUN [--resolution 0.05]
+    python3 crates/yfslam-bench/peers/open_maps.py --yfslam target/release/yfslam RUN [--resolution 0.05]
 
 Ends with an error at the first product that another reader sees otherwise. A reader that is not installed is named as skipped.
 """

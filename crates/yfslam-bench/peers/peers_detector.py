@@ -2,7 +2,7 @@
 """Times the detector's forward pass beside ONNX Runtime and ncnn: one thread each, the same weights (the official ones; ncnn takes no
 others), the same 352×352 input. The embedded network, of one class, is timed too, in ONNX Runtime and here.
 
-python3 benches/peers_detector.py [DATA_FOLDER] [--rounds 5] [--runs 100]
+python3 crates/yfslam-bench/peers/peers_detector.py [DATA_FOLDER] [--rounds 5] [--runs 100]
 (pip: onnxruntime, ncnn, numpy; DATA_FOLDER defaults to YFSLAM_DATA, else ../shared/data)
 
 The engines take turns for a few rounds, so that all see the same load; reported are the minimum and the median of the process
@@ -20,7 +20,7 @@ import ncnn
 import numpy as np
 import onnxruntime
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 EMBEDDED = ROOT / "crates/yfslam-detect/models/person.onnx"
 WARM_UP = 10
 

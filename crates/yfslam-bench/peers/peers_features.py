@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Times feature extraction beside OpenCV's ORB: one thread each, 1,000 features, the same grey pictures.
+"""Times feature extraction beside OpenCV's ORB: one thread each, 1,000 features, the same grey images.
 
-python3 benches/peers_features.py [DATA_FOLDER] [--runs 100]        (pip: opencv-python-headless)
+python3 crates/yfslam-bench/peers/peers_features.py [DATA_FOLDER] [--runs 100]        (pip: opencv-python-headless)
 
-Both take turns for three rounds on each picture; reported are the least time and the least median of the rounds, in ms.
+Both take turns for three rounds on each image; reported are the least time and the least median of the rounds, in ms.
 """
 import argparse
 import os
@@ -15,15 +15,15 @@ import time
 
 import cv2
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 
 
-def opencv(picture, runs):
+def opencv(image, runs):
     orb, times = cv2.ORB_create(1000), []
-    orb.detectAndCompute(picture, None)
+    orb.detectAndCompute(image, None)
     for _ in range(runs):
         start = time.perf_counter()
-        points, _ = orb.detectAndCompute(picture, None)
+        points, _ = orb.detectAndCompute(image, None)
         times.append((time.perf_counter() - start) * 1e3)
     return min(times), statistics.median(times), len(points)
 
@@ -42,15 +42,15 @@ def main():
     args = parser.parse_args()
     subprocess.run(["cargo", "build", "--release", "-q", "-p", "yfslam", "--example", "time_features"], check=True, cwd=ROOT)
     cv2.setNumThreads(1)
-    print("| picture | OpenCV ORB min / median, ms | yfslam min / median, ms | ratio of minima |\n|---|---|---|---|")
+    print("| image | OpenCV ORB min / median, ms | yfslam min / median, ms | ratio of minima |\n|---|---|---|---|")
     for name in ("tum_fr1_xyz_dev", "bonn_crowd_dev"):
         files = sorted((args.data / "rgbd" / name / "rgb").iterdir())
         for file in (files[0], files[len(files) // 2]):
-            picture = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+            image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
             with tempfile.TemporaryDirectory() as folder:
-                pgm = pathlib.Path(folder) / "picture.pgm"
-                cv2.imwrite(str(pgm), picture)
-                rounds = [(opencv(picture, args.runs), ours(pgm, args.runs)) for _ in range(3)]
+                pgm = pathlib.Path(folder) / "image.pgm"
+                cv2.imwrite(str(pgm), image)
+                rounds = [(opencv(image, args.runs), ours(pgm, args.runs)) for _ in range(3)]
             theirs, mine = [[min(r[side][i] for r in rounds) for i in (0, 1)] for side in (0, 1)]
             print(f"| {name}/{file.name} | {theirs[0]:.2f} / {theirs[1]:.2f} | {mine[0]:.2f} / {mine[1]:.2f} | "
                   f"{mine[0] / theirs[0]:.2f} |", flush=True)

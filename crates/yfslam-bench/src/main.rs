@@ -21,13 +21,23 @@ enum Subcommands {
     /// Measure a topic, or all of them: what the records do not have for this commit, network and machine.
     Measure(MeasureArgs),
     /// Write the pages in docs/results and the table of README.md from the records.
-    Render,
+    Render(RenderArgs),
     /// Compare the pages with the records; fails if they differ.
     Check,
     /// Run an experiment on loops, relocalisation, long or live runs, and print its table.
     Places(places::Arguments),
     /// Compare dense maps of rendered worlds with the exact world, and print the table.
     Dense(dense::Arguments),
+}
+
+#[derive(Args)]
+struct RenderArgs {
+    /// Folder of the records [default: docs/results/data].
+    #[arg(long)]
+    data: Option<PathBuf>,
+    /// Write the pages to this folder instead, also those of records that were measured with --quick.
+    #[arg(long)]
+    preview: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -51,9 +61,10 @@ struct MeasureArgs {
 fn main() -> Result<()> {
     match Cli::parse().command {
         Subcommands::Measure(arguments) => measure(&arguments),
-        Subcommands::Render => {
+        Subcommands::Render(arguments) => {
             let root = root();
-            for page in render::write(&root, &root.join(render::DATA))? {
+            let data = arguments.data.unwrap_or_else(|| root.join(render::DATA));
+            for page in render::write(&root, &data, arguments.preview.as_deref())? {
                 println!("written: {}", page.display());
             }
             Ok(())

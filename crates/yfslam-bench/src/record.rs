@@ -15,7 +15,7 @@ use crate::row::Row;
 /// The state of the project and the machine on which a record was measured.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct State {
-    /// Commit of the program: the last one that changed more than documentation.
+    /// Commit of the program: the last one that changed what is built.
     pub commit: String,
     /// The network: `embedded NNNNNNNNNNNN` or `official COCO weights NNNNNNNNNNNN`, with the first digits of its SHA-256.
     pub network: String,

@@ -16,7 +16,7 @@ const DIGITS: usize = 12;
 /// # Errors
 /// Git or the program does not answer, or, unless `quick`, files other than documentation have changes that are not committed.
 pub fn find(root: &Path, program: &Path, quick: bool) -> Result<State> {
-    let code = ["--", ".", ":!docs", ":!*.md", ":!README.md"];
+    let code = ["--", "crates", "Cargo.toml", "Cargo.lock", ".cargo", ":!*.md", ":!crates/yfslam-bench/src/render"];
     let changed = git(root, &[&["status", "--porcelain", "--untracked-files=no"][..], &code].concat())?;
     ensure!(
         quick || changed.is_empty(),

@@ -80,9 +80,12 @@ impl Spread {
         Some(Self { median, min, max })
     }
 
-    /// `median (min–max)` with the given number of decimals.
+    /// `median (min–max)` with the given number of decimals; the median alone where all values are the same.
     pub fn text(spread: Option<Self>, decimals: usize) -> String {
         let Some(Self { median, min, max }) = spread else { return "–".into() };
+        if min.to_bits() == max.to_bits() {
+            return format!("{median:.decimals$}");
+        }
         format!("{median:.decimals$} ({min:.decimals$}–{max:.decimals$})")
     }
 
@@ -112,6 +115,15 @@ pub fn values<'a>(records: &[&'a Record], key: &str) -> Vec<&'a str> {
         }
     }
     values
+}
+
+/// The methods of the records, in the order of the tables: from no filter to the default.
+pub fn methods<'a>(records: &[&'a Record]) -> Vec<&'a str> {
+    let order =
+        |method: &&str| ["none", "boxes", "yf", "ds", "dyna", "dms", "full"].iter().position(|name| name == method);
+    let mut methods = values(records, "method");
+    methods.sort_by_key(order);
+    methods
 }
 
 /// The records whose case has these values.

@@ -42,15 +42,15 @@ fn jobs(setup: &Setup) -> Result<Vec<Job>> {
                     let mut arguments: Vec<String> = words.map(str::to_owned).to_vec();
                     arguments.push(runs::text(&out)?);
                     arguments.extend(part.arguments(frame_count(&folder)?));
-                    let (_, usage) = setup.program.run(&arguments)?;
+                    let (_, processor_s) = setup.program.run(&arguments)?;
                     let run = read_run(&out)?;
                     let frames = runs::number(&run, "/frames/read").unwrap_or_default().max(1.0);
                     let row = Row::new()
                         .case("sequence", &name)
                         .case("method", method)
                         .case("round", round)
-                        .figure("process_ms_per_frame", 1e3 * usage.processor_s / frames)
-                        .figure("peak_mb", usage.peak_mb)
+                        .figure("process_ms_per_frame", 1e3 * processor_s / frames)
+                        .figure("peak_mb", runs::number(&run, "/peak_memory_mb"))
                         .figure("wall_ms_per_frame", runs::number(&run, "/wall_s").map(|wall_s| 1e3 * wall_s / frames))
                         .figure("cpu_s_ms_per_frame", runs::number(&run, "/cpu_s").map(|cpu_s| 1e3 * cpu_s / frames))
                         .figure("parts_ms_per_frame", parts(&run, frames))
@@ -101,29 +101,18 @@ fn page(records: &[&Record]) -> Result<String> {
         "wall, ms a frame",
         "peak memory, MB",
     ]);
-    let mut parts = Table::new(["sequence", "method", "part", "ms a frame", "share of the process"]);
-    let mut stages = Table::new(["sequence", "method", "stage", "wall, median, ms"]);
     for sequence in values(records, "sequence") {
         for method in values(records, "method") {
             let rows = select(records, &[("sequence", sequence), ("method", method)]);
             let spread = |key: &str| Spread::of(rows.iter().map(|record| record.figure(key)));
-            let process = spread("process_ms_per_frame");
             whole.row([
                 sequence.to_owned(),
                 method.to_owned(),
-                Spread::text(process, 1),
+                Spread::text(spread("process_ms_per_frame"), 1),
                 Spread::middle(spread("cpu_s_ms_per_frame"), 1),
                 Spread::middle(spread("wall_ms_per_frame"), 1),
                 Spread::middle(spread("peak_mb"), 0),
             ]);
-            for (part, spread) in nested(&rows, "parts_ms_per_frame") {
-                let share = process.map(|process| 100.0 * spread.median / process.median);
-                let share = number(share, 0) + " %";
-                parts.row([sequence, method, &part, &number(Some(spread.median), 2), &share]);
-            }
-            for (stage, spread) in nested(&rows, "stages_median_ms") {
-                stages.row([sequence, method, &stage, &number(Some(spread.median), 2)]);
-            }
         }
     }
     let mut text = format!(
@@ -131,12 +120,43 @@ fn page(records: &[&Record]) -> Result<String> {
          the process, divided by the frames: start, decoding, detection, tracking, mapping, writing the results. Three runs of each, in turns; \
          median, least and greatest. Compare these figures only with others of the same machine.\n\n{whole}"
     );
+    let parts = by_name(records, "parts_ms_per_frame", true);
     if !parts.is_empty() {
-        text += &format!("\n## Parts of the process\n\nProcessor time as `run.json` counts it.\n\n{parts}");
+        text += &format!("\n## Parts of the process\n\nProcessor time as `run.json` counts it, ms a frame.\n\n{parts}");
     }
+    let stages = by_name(records, "stages_median_ms", false);
     Ok(text
         + &format!(
-            "\n## Stages\n\nWall time as `run.json` tells it; the median over the frames, or over the keyframes for mapping. Decoding runs on \
+            "\n## Stages\n\nWall time as `run.json` tells it, ms; the median over the frames, or over the keyframes for mapping. Decoding runs on \
              other threads than the rest.\n\n{stages}"
         ))
+}
+
+/// A table with a row for each entry of a nested figure and a column for each sequence and method; with `rest`, also what is missing
+/// from the whole process.
+fn by_name(records: &[&Record], key: &str, rest: bool) -> Table {
+    let mut columns = Vec::new();
+    for sequence in values(records, "sequence") {
+        for method in values(records, "method") {
+            let rows = select(records, &[("sequence", sequence), ("method", method)]);
+            let process = Spread::of(rows.iter().map(|record| record.figure("process_ms_per_frame")));
+            columns.push((format!("{sequence}, {method}"), nested(&rows, key), process));
+        }
+    }
+    let mut names: Vec<String> = columns.iter().flat_map(|(_, entries, _)| entries.keys().cloned()).collect();
+    names.sort_unstable();
+    names.dedup();
+    let mut table = Table::new(["part"].into_iter().chain(columns.iter().map(|(title, ..)| title.as_str())));
+    for name in &names {
+        let cells = columns.iter().map(|(_, entries, _)| Spread::middle(entries.get(name).copied(), 2));
+        table.row([name.clone()].into_iter().chain(cells));
+    }
+    if rest && !names.is_empty() {
+        let cells = columns.iter().map(|(_, entries, process)| {
+            let counted: f64 = entries.values().map(|spread| spread.median).sum();
+            number(process.map(|process| process.median - counted), 2)
+        });
+        table.row(["not counted".to_owned()].into_iter().chain(cells));
+    }
+    table
 }

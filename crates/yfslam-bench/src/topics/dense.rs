@@ -51,7 +51,7 @@ fn recording_row(setup: &Setup, name: &str, run: &runs::MethodRun) -> Result<Row
     let _ = std::fs::remove_dir_all(&products);
     let words =
         ["map", &runs::text(&run.folder)?, "--resolution", &RESOLUTION_M.to_string(), "--out", &runs::text(&products)?];
-    let (text, usage) = setup.program.run(&words.map(str::to_owned))?;
+    let (text, processor_s) = setup.program.run(&words.map(str::to_owned))?;
     let size_mb = |path: &std::path::Path| std::fs::metadata(path).ok().map(|data| data.len() as f64 * 1e-6);
     let cell = |keys: &[&str]| keys.iter().find_map(|key| runs::number(value, key));
     Ok(case
@@ -60,8 +60,7 @@ fn recording_row(setup: &Setup, name: &str, run: &runs::MethodRun) -> Result<Row
         .figure("memory_mb", cell(&["/dense/pieces_mb", "/dense/patches_mb"]))
         .figure("file_mb", size_mb(&run.folder.join("dense.map")))
         .figure("occupied", occupied(&text))
-        .figure("products_s", usage.processor_s)
-        .figure("products_peak_mb", usage.peak_mb)
+        .figure("products_s", processor_s)
         .figure("mesh_mb", size_mb(&products.join("mesh.ply")))
         .figure("octomap_mb", size_mb(&products.join("octomap.bt"))))
 }
@@ -119,7 +118,6 @@ fn page(records: &[&Record]) -> Result<String> {
         "keyframe patches, MB",
         "`dense.map`, MB",
         "`yfslam map`: processor time, s",
-        "its peak memory, MB",
         "`mesh.ply`, MB",
         "`octomap.bt`, MB",
     ]);
@@ -135,7 +133,6 @@ fn page(records: &[&Record]) -> Result<String> {
             figure("memory_mb", 1),
             figure("file_mb", 1),
             figure("products_s", 1),
-            figure("products_peak_mb", 0),
             figure("mesh_mb", 1),
             figure("octomap_mb", 2),
         ]);

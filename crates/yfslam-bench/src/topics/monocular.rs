@@ -20,7 +20,7 @@ fn jobs(setup: &Setup) -> Result<Vec<Job>> {
         for seed in 0..setup.pick(SEEDS, 1) {
             let (name, folder) = (name.to_owned(), folder.clone());
             jobs.push(Job::new(format!("{name}, seed {seed}"), move |setup| {
-                let part = Part { start: 0, frames: setup.quick.then_some(90), backward: false };
+                let part = Part { start: 0, frames: setup.quick.then_some(180), backward: false };
                 let words =
                     ["--sensor", "mono", "--seed", &seed.to_string(), "--detector", "embedded", "--groundtruth"];
                 let mut options: Vec<String> = words.map(str::to_owned).to_vec();

@@ -22,7 +22,7 @@ pub struct MethodRun {
 /// Takes a sequence through some methods side by side. Returns the command and the run of each method.
 ///
 /// # Errors
-/// The program cannot be started, or no method left a result.
+/// The program cannot be started, does not take the arguments, or crashes. A method without a trajectory is a result.
 pub fn methods(
     setup: &Setup,
     sequence: &str,
@@ -33,7 +33,7 @@ pub fn methods(
     let _ = std::fs::remove_dir_all(&out);
     let words = ["run", sequence, "--method", &methods.join(","), "--quiet", "--out", &out.to_string_lossy()];
     let arguments: Vec<String> = words.map(str::to_owned).into_iter().chain(options.iter().cloned()).collect();
-    let (text, _, success) = setup.program.try_run(&arguments)?;
+    let (text, _, code) = setup.program.try_run(&arguments)?;
     let run = |method: &&str| {
         let folder = if methods.len() == 1 { out.clone() } else { out.join(method) };
         let result = read_run(&folder).map_err(|_| {
@@ -44,7 +44,7 @@ pub fn methods(
     };
     let runs: Vec<_> = methods.iter().map(run).collect();
     let command = setup.program.command(&arguments);
-    if !success && runs.iter().all(|run| run.result.is_err()) {
+    if code.is_none_or(|code| code > 1) {
         anyhow::bail!("{command} failed: {text}");
     }
     Ok((command, runs))

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::{Job, Setup, Topic, runs};
 use crate::record::Record;
-use crate::render::{Spread, Table, one_state, percent, select, values};
+use crate::render::{Spread, Table, methods, one_state, percent, select, values};
 use crate::row::Row;
 
 /// The topic.
@@ -102,7 +102,7 @@ fn table(records: &[&Record], worlds: &[&str]) -> Result<Table> {
     ]);
     for world in worlds {
         let of_world = select(records, &[("sequence", world)]);
-        for method in values(&of_world, "method") {
+        for method in methods(&of_world) {
             let rows = select(&of_world, &[("method", method)]);
             let spread = |key: &str| Spread::of(rows.iter().map(|record| record.figure(key)));
             let tracked = spread("tracked");
