@@ -52,8 +52,8 @@ fn jobs(setup: &Setup) -> Result<Vec<Job>> {
                         .figure("process_ms_per_frame", 1e3 * processor_s / frames)
                         .figure("peak_mb", runs::number(&run, "/peak_memory_mb"))
                         .figure("wall_ms_per_frame", runs::number(&run, "/wall_s").map(|wall_s| 1e3 * wall_s / frames))
-                        .figure("cpu_s_ms_per_frame", runs::number(&run, "/cpu_s").map(|cpu_s| 1e3 * cpu_s / frames))
-                        .figure("parts_ms_per_frame", parts(&run, frames))
+                        .figure("run_json_ms_per_frame", runs::number(&run, "/process_ms_per_frame"))
+                        .figure("parts_ms_per_frame", parts(&run))
                         .figure("stages_median_ms", stages(&run));
                     Ok((setup.program.command(&arguments), vec![row]))
                 }));
@@ -64,13 +64,8 @@ fn jobs(setup: &Setup) -> Result<Vec<Job>> {
 }
 
 /// Processor time of each part of the process for a frame, where `run.json` has it, ms.
-fn parts(run: &Value, frames: f64) -> Value {
-    let keys = ["/processor_s", "/cpu_parts_s", "/cpu"];
-    let Some(parts) = keys.iter().find_map(|key| run.pointer(key)?.as_object()) else { return Value::Null };
-    let of_frame = |(key, value): (&String, &Value)| {
-        Some((key.trim_end_matches("_s").to_owned(), Value::from(1e3 * value.as_f64()? / frames)))
-    };
-    Value::Object(parts.iter().filter_map(of_frame).collect())
+fn parts(run: &Value) -> Value {
+    run.pointer("/process_parts_ms_per_frame").filter(|parts| parts.is_object()).cloned().unwrap_or_default()
 }
 
 /// Median wall time of each stage, ms.
@@ -97,7 +92,7 @@ fn page(records: &[&Record]) -> Result<String> {
         "sequence",
         "method",
         "whole process, ms a frame",
-        "counted by `run.json` (`cpu_s`), ms a frame",
+        "over the frames, by `run.json`, ms a frame",
         "wall, ms a frame",
         "peak memory, MB",
     ]);
@@ -109,7 +104,7 @@ fn page(records: &[&Record]) -> Result<String> {
                 sequence.to_owned(),
                 method.to_owned(),
                 Spread::text(spread("process_ms_per_frame"), 1),
-                Spread::middle(spread("cpu_s_ms_per_frame"), 1),
+                Spread::middle(spread("run_json_ms_per_frame"), 1),
                 Spread::middle(spread("wall_ms_per_frame"), 1),
                 Spread::middle(spread("peak_mb"), 0),
             ]);
@@ -122,7 +117,9 @@ fn page(records: &[&Record]) -> Result<String> {
     );
     let parts = by_name(records, "parts_ms_per_frame", true);
     if !parts.is_empty() {
-        text += &format!("\n## Parts of the process\n\nProcessor time as `run.json` counts it, ms a frame.\n\n{parts}");
+        text += &format!(
+            "\n## Parts of the process\n\nProcessor time as `run.json` counts it, ms a frame. Start and end are what is missing from the whole process.\n\n{parts}"
+        );
     }
     let stages = by_name(records, "stages_median_ms", false);
     Ok(text
@@ -156,7 +153,7 @@ fn by_name(records: &[&Record], key: &str, rest: bool) -> Table {
             let counted: f64 = entries.values().map(|spread| spread.median).sum();
             number(process.map(|process| process.median - counted), 2)
         });
-        table.row(["not counted".to_owned()].into_iter().chain(cells));
+        table.row(["start and end".to_owned()].into_iter().chain(cells));
     }
     table
 }
