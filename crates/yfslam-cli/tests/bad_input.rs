@@ -8,7 +8,7 @@ use std::path::Path;
 
 use common::{SMALL_WORLD, edit_lines, fails, record, report, succeeds};
 use tempfile::TempDir;
-use yfslam::image::Image;
+use yfslam::Image;
 use yfslam_io::write::{write_color_png, write_depth_png};
 
 fn recording() -> TempDir {

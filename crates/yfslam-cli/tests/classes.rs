@@ -18,12 +18,11 @@ use std::sync::{Arc, Mutex};
 use common::succeeds;
 use judge::{index_of, t_survey_world};
 use nalgebra::{Isometry3, Point3};
-use yfslam::dense::classes::classes;
+use yfslam::dense::classes;
 use yfslam::dense::persist::encode;
-use yfslam::dense::voxels::{Voxel, voxel_at};
-use yfslam::dense::{DenseConfig, DenseMapper, Survey, Volume, up};
-use yfslam::image::RgbImage;
-use yfslam::{Config, Detection, Detector, DetectorError, Execution, Slam};
+use yfslam::dense::{Voxel, voxel_at};
+use yfslam::dense::{DenseConfig, DenseMapper, DenseMap, Volume, up};
+use yfslam::{Config, Detection, Detector, DetectorError, Execution, RgbImage, Slam};
 use yfslam_synth::{CLASS_NAMES, World, parse};
 
 /// Class of the static box, as an index into [`CLASS_NAMES`].
@@ -47,7 +46,7 @@ impl Detector for Oracle {
 }
 
 /// Returns the map of a world with exact detections.
-fn survey_of(world: &World) -> Survey {
+fn survey_of(world: &World) -> DenseMap {
     let boxes = Arc::new(Mutex::new(Vec::new()));
     let oracle = Oracle { names: CLASS_NAMES.map(str::to_owned).to_vec(), boxes: boxes.clone() };
     let camera = &world.config().camera;
@@ -73,7 +72,7 @@ fn survey_of(world: &World) -> Survey {
 }
 
 /// Returns the voxels with the exact surface of the box that the patches observe.
-fn true_voxels(survey: &Survey, volume: &Volume, world: &World) -> BTreeSet<Voxel> {
+fn true_voxels(survey: &DenseMap, volume: &Volume, world: &World) -> BTreeSet<Voxel> {
     let camera = &world.config().camera;
     let turn = volume.pose(0).unwrap() * survey.pieces[0].t_world_cam.inverse() * t_survey_world(survey, world);
     let mut voxels = BTreeSet::new();
@@ -93,7 +92,7 @@ fn true_voxels(survey: &Survey, volume: &Volume, world: &World) -> BTreeSet<Voxe
 }
 
 /// Returns the number of voxels of the box, of those with its class, of other voxels with its class, and of those with another class.
-fn count_named(survey: &Survey, world: &World) -> [usize; 4] {
+fn count_named(survey: &DenseMap, world: &World) -> [usize; 4] {
     let volume = survey.volume(&DenseConfig::default(), &up::of_survey(survey), |_| {});
     let (truth, found) = (true_voxels(survey, &volume, world), classes(survey, &volume, |_| {}));
     let near = |[x, y, z]: Voxel| (0..27).any(|i| truth.contains(&[x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]));
@@ -130,7 +129,7 @@ fn a_box_among_walking_people_has_its_class_also_if_it_is_not_detected_in_half_o
 }
 
 /// `yfslam map` writes classes to all products that can hold them, and prints their counts.
-fn products_have_classes(survey: &Survey) {
+fn products_have_classes(survey: &DenseMap) {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("dense.map"), encode(survey).unwrap()).unwrap();
     let printed = succeeds(folder.path(), &["map", "dense.map", "--cloud", "--octomap", "--out", "out"]).stdout;

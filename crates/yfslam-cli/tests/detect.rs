@@ -8,7 +8,7 @@ use std::path::Path;
 
 use common::{fails, real_data, succeeds, yfslam};
 use serde_json::Value;
-use yfslam::image::RgbImage;
+use yfslam::RgbImage;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
 

@@ -10,7 +10,7 @@ use std::fs;
 use common::succeeds;
 use networks::other::{BOXES, net_with_masks};
 use serde_json::{Value, json};
-use yfslam::image::RgbImage;
+use yfslam::RgbImage;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
 

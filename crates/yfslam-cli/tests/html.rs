@@ -11,7 +11,7 @@ use common::{edit_lines, record, report, succeeds};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use serde_json::Value;
-use yfslam::image::RgbImage;
+use yfslam::RgbImage;
 use yfslam_io::write::write_color_png;
 
 /// Elements that HTML leaves open.

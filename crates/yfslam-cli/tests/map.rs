@@ -21,8 +21,8 @@ use judge::{Occupancy, Truth, survey_of_exact_poses};
 use survey::{Taken, Way, take};
 use thickness::thickness;
 use yfslam::dense::persist::decode;
-use yfslam::dense::{DenseConfig, Survey, SurveyPiece, Volume, up};
-use yfslam::dynamic::Method;
+use yfslam::dense::{DenseConfig, DenseMap, PlacedPatch, Volume, up};
+use yfslam::Method;
 use yfslam_synth::{World, parse};
 
 /// Two people walk through the image.
@@ -148,12 +148,12 @@ fn the_map_of_two_sessions_shows_what_both_have_observed() {
     let (before, both) = (survey("first.map"), survey("both.map"));
     assert_eq!(survey("second/dense.map"), both);
     let earlier = before.pieces.len();
-    let pieces = |survey: &Survey| survey.pieces.iter().map(|one| one.piece.clone()).collect::<Vec<_>>();
+    let pieces = |survey: &DenseMap| survey.pieces.iter().map(|one| one.piece.clone()).collect::<Vec<_>>();
     assert!(earlier >= 8 && both.pieces.len() >= earlier + 6, "{earlier} of {} pieces", both.pieces.len());
     assert_eq!(pieces(&both)[..earlier], pieces(&before));
     // The patches of each session, where the map of both has them.
-    let part = |pieces: &[SurveyPiece]| Survey { pieces: pieces.to_vec(), ..both.clone() };
-    let occupied = |survey: &Survey| {
+    let part = |pieces: &[PlacedPatch]| DenseMap { pieces: pieces.to_vec(), ..both.clone() };
+    let occupied = |survey: &DenseMap| {
         let volume = survey.volume(&DenseConfig::default(), &up::of_camera(), |_| {});
         let voxels = volume.voxels().filter(|known| known.occupied).map(|known| known.voxel);
         (voxels.collect::<Vec<_>>(), volume)
@@ -179,7 +179,7 @@ fn world(spec: &str) -> World {
     World::new(&config).unwrap()
 }
 
-fn mapped(world: &World, method: Method) -> (Survey, Volume) {
+fn mapped(world: &World, method: Method) -> (DenseMap, Volume) {
     let config = DenseConfig::default();
     let taken = take(world, &[Way { method, loops: true }], &config).unwrap().remove(0);
     let Taken { survey, each_ms, bytes } = taken;
@@ -221,7 +221,7 @@ fn after_a_loop_walls_observed_twice_are_as_thin_as_without_drift() {
     let config = DenseConfig::default();
     let way = |loops| Way { method: Method::None, loops };
     let taken = take(&world, &[way(true), way(false)], &config).unwrap();
-    let of = |survey: &Survey| thickness(survey, &world, &config);
+    let of = |survey: &DenseMap| thickness(survey, &world, &config);
     let (closed, open) = (of(&taken[0].survey), of(&taken[1].survey));
     let exact = of(&survey_of_exact_poses(&taken[0].survey, &world));
     println!("exact poses {exact:?}\nloop closed {closed:?}\nno loops    {open:?}");

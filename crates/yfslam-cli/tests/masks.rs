@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use common::{ate_rmse, fails, record, report, succeeds};
-use yfslam::image::Image;
+use yfslam::Image;
 use yfslam_io::write::{write_color_png, write_depth_png};
 
 /// People who walk past; without masks the error is large.
@@ -29,7 +29,11 @@ fn masks_alone_suffice_to_drop_walking_people() {
     succeeds(root, &["synth", WALKING, "--out", "rec", "-q"]);
     let args = ["run", "rec", "--masks", "rec/masks", "--method", "none,full,dyna", "--out", "out"];
     let output = succeeds(root, &args);
-    assert!(output.stderr.contains("no detector is running") && output.stderr.contains("60 of 60"), "{}", output.stderr);
+    assert!(
+        output.stderr.contains("no detector is running") && output.stderr.contains("60 of 60"),
+        "{}",
+        output.stderr
+    );
     let [none, full, dyna] = ["none", "full", "dyna"].map(|method| report(&root.join("out").join(method)));
     assert_eq!(full["boxes"], "masks");
     assert_eq!((&full["masks"]["found"], &full["masks"]["missing"]), (&60.into(), &0.into()));

@@ -9,10 +9,7 @@ use std::sync::{Arc, OnceLock};
 use common::{ate_rmse, fails, report, succeeds};
 use nalgebra::{Rotation3, Vector3};
 use yfslam::config::DepthSource;
-use yfslam::dynamic::Method;
-use yfslam::image::RgbImage;
-use yfslam::loops::LoopClosed;
-use yfslam::{Camera, Config, RgbdFrame, Slam};
+use yfslam::{Camera, Config, Frame, LoopClosure, Method, RgbImage, Slam};
 use yfslam_eval::{AlignmentKind, Match, StampedPose, ate};
 use yfslam_synth::World;
 
@@ -79,7 +76,7 @@ fn turned(image: &RgbImage, camera: &Camera, turn: Vector3<f64>) -> RgbImage {
 #[test]
 fn a_single_camera_that_only_turns_initialises_no_map() {
     let world = World::new(&yfslam_synth::parse("sitting_xyz?people=0&frames=1").unwrap()).unwrap();
-    let RgbdFrame { color, depth, .. } = world.frame(0).frame;
+    let Frame { color, depth, .. } = world.frame(0).frame;
     let camera = &world.config().camera;
     let mut config = Config::default();
     (config.depth.source, config.dynamic.method) = (DepthSource::Motion, Method::None);
@@ -88,7 +85,7 @@ fn a_single_camera_that_only_turns_initialises_no_map() {
         let turn = Vector3::new(0.002, 0.006, 0.003) * f64::from(k);
         let color = Arc::new(turned(&color, camera, turn));
         let (depth, timestamp_ns) = (Arc::clone(&depth), i64::from(k) * 33_000_000);
-        let frame = RgbdFrame { timestamp_ns, color, depth, right: None, detections: None, mask: None };
+        let frame = Frame { timestamp_ns, color, depth, right: None, detections: None, mask: None };
         assert!(slam.track(&frame).unwrap().t_world_cam.is_none(), "frame {k}");
     }
     assert_eq!(slam.map().keyframe_count(), 0);
@@ -99,7 +96,7 @@ const ROUND: &str = "walking_xyz?scene=office&motion=loop&people=0&frames=500&fp
 
 /// The results of a path around the office.
 struct Round {
-    loops: Vec<LoopClosed>,
+    loops: Vec<LoopClosure>,
     /// Number of submaps.
     parts: usize,
     /// Frames with a pose in the largest map, and their error after alignment by a similarity, m.

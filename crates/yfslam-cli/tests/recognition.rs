@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use common::{ate_rmse, fails, report, succeeds};
-use yfslam::map::persist::decode;
+use yfslam::SavedMap;
 use yfslam_io::write_atomically;
 
 /// A desk without people; the camera moves along its axes.

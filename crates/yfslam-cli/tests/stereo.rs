@@ -10,8 +10,7 @@ use std::path::Path;
 use common::{ate_rmse, fails, report, succeeds};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde_json::Value;
-use yfslam::Camera;
-use yfslam::image::{Image, RgbImage};
+use yfslam::{Camera, Image, RgbImage};
 use yfslam_io::write::{write_color_png, write_mask_png};
 use yfslam_synth::World;
 

@@ -60,7 +60,7 @@ fn boxes_masks_settings_and_lists_equal_those_of_the_world() {
         assert_eq!(known["bbox"][2], f64::from(bbox.x_max));
     }
     let stamp = yfslam_io::time::format_stamp(shot.frame.timestamp_ns);
-    let mut mask = yfslam::image::RgbImage::default();
+    let mut mask = yfslam::RgbImage::default();
     let bytes = fs::read(rec.join(format!("masks/{stamp}.png"))).unwrap();
     yfslam_io::decode::decode_color(&bytes, None, &mut mask).unwrap();
     assert!(mask.data().iter().map(|rgb| rgb[0]).eq(shot.instances.data().iter().copied()));
@@ -82,7 +82,7 @@ fn a_carried_laptop_has_its_name_its_box_and_its_mask() {
         let Some(found) = frame["boxes"].as_array().unwrap().iter().find(|b| b["class"] == "laptop") else { continue };
         assert_eq!(found["instance"], 2);
         let stamp = yfslam_io::time::format_stamp(frame["timestamp_ns"].as_i64().unwrap());
-        let mut mask = yfslam::image::RgbImage::default();
+        let mut mask = yfslam::RgbImage::default();
         let bytes = fs::read(rec.join(format!("masks/{stamp}.png"))).unwrap();
         yfslam_io::decode::decode_color(&bytes, None, &mut mask).unwrap();
         let own: Vec<usize> = (0..mask.data().len()).filter(|&i| mask.data()[i][0] == 2).collect();

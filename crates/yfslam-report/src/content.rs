@@ -45,7 +45,7 @@ pub struct MethodReport<'a> {
     /// Snapshots, in order of time.
     pub snapshots: Vec<Snapshot>,
     /// Dense map, if one was made.
-    pub dense: Option<DenseMap>,
+    pub dense: Option<DenseMapImages>,
     /// Configuration, as text.
     pub config: String,
 }
@@ -111,7 +111,7 @@ pub struct Snapshot {
 
 /// Images of a dense map.
 #[derive(Clone, Debug)]
-pub struct DenseMap {
+pub struct DenseMapImages {
     /// Number of its keyframes.
     pub keyframes: usize,
     /// Number of occupied voxels.

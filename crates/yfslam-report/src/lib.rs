@@ -25,7 +25,7 @@ mod figures;
 mod html;
 mod table;
 
-pub use content::{DenseMap, Frames, MethodReport, ProcessorTime, Report, Snapshot, Stage, Times};
+pub use content::{DenseMapImages, Frames, MethodReport, ProcessorTime, Report, Snapshot, Stage, Times};
 pub use evaluation::{errors_table, evaluation_table, rpe_errors};
 pub use html::tables_page::{IMPROVEMENT, ORIGIN, PUBLISHED, TableSection, TablesPage};
 pub use table::{Table, TableStyle};

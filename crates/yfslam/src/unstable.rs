@@ -66,6 +66,14 @@ pub fn descriptors_of(keyframe: &KeyFrame) -> Vec<Descriptor> {
     trusted(&keyframe.features)
 }
 
+/// Checks the invariants of a map.
+///
+/// # Errors
+/// The first invariant that does not hold.
+pub fn check_map(map: &Map) -> Result<(), String> {
+    map.validate()
+}
+
 fn trusted(features: &FrameFeatures) -> Vec<Descriptor> {
     let pairs = features.features.iter().zip(&features.descriptors);
     pairs.filter(|(feature, _)| feature.trust > 0.0).map(|(_, descriptor)| *descriptor).collect()

@@ -6,9 +6,9 @@
 
 use anyhow::Result;
 use nalgebra::{Isometry3, Point3};
-use yfslam::dense::background::Backgrounds;
-use yfslam::dense::{CellGrid, DenseConfig, Piece, Survey, Volume};
-use yfslam::image::Image;
+use yfslam::Image;
+use yfslam::dense::Backgrounds;
+use yfslam::dense::{CellGrid, DenseConfig, DenseMap, KeyframePatch, Volume};
 use yfslam_synth::World;
 
 use super::ghost_metrics::index_of;
@@ -76,36 +76,37 @@ impl ExactView {
 }
 
 /// Compares the views of every few keyframes.
-pub fn compare(survey: &Survey, volume: &Volume, world: &World) -> Result<BackgroundMetrics> {
-    let exact_views: Vec<ExactView> = survey.pieces.iter().map(|one| ExactView::of(world, one.timestamp_ns)).collect();
+pub fn compare(map: &DenseMap, volume: &Volume, world: &World) -> Result<BackgroundMetrics> {
+    let exact_views: Vec<ExactView> = map.patches.iter().map(|one| ExactView::of(world, one.timestamp_ns)).collect();
     let mut empty = world.config().clone();
     (empty.people, empty.actors) = (0, Default::default());
     let empty = World::new(&empty)?;
     let config = DenseConfig::default();
-    let views = Backgrounds::new(survey, volume, |_| {});
+    let views = Backgrounds::new(map, volume, |_| {});
     let (mut all, mut filled) = (Error::default(), Error::default());
     let (mut cells, mut known, mut hidden, mut hidden_known, mut fillable) = (0usize, 0usize, 0usize, 0usize, 0usize);
-    for (number, one) in survey.pieces.iter().enumerate().step_by(EVERY) {
+    for (number, one) in map.patches.iter().enumerate().step_by(EVERY) {
         let frame = empty.frame(index_of(&empty, one.timestamp_ns));
-        let exact = Piece::cut(&config, &survey.grid, &frame.frame.color, &frame.frame.depth, |_, _| false);
-        let Some(view) = views.of_piece(number) else { continue };
+        let Some(depth) = &frame.frame.depth else { continue };
+        let exact = KeyframePatch::extract(&config, &map.grid, &frame.frame.color, depth, |_, _| false);
+        let Some(view) = views.of_patch(number) else { continue };
         let mut brightness = [[0.0f64; 3]; 2];
-        for cell in (0..view.valid.data().len()).filter(|cell| !one.piece.moves(*cell)) {
+        for cell in (0..view.valid.data().len()).filter(|cell| !one.patch.moves(*cell)) {
             for (sums, rgb) in brightness.iter_mut().zip([view.color.data()[cell], exact.color(cell)]) {
                 sums.iter_mut().zip(rgb).for_each(|(sum, v)| *sum += f64::from(v));
             }
         }
         let gain = [0, 1, 2].map(|channel| brightness[0][channel] / brightness[1][channel].max(1.0));
         let is_fillable = |cell: usize| {
-            let (columns, stride) = (survey.grid.columns(), survey.grid.stride_px());
+            let (columns, stride) = (map.grid.columns(), map.grid.stride_px());
             let z =
                 frame.exact_depth.get(cell % columns * stride, cell / columns * stride).copied().unwrap_or_default();
-            let [x, y] = survey.grid.rays()[cell];
+            let [x, y] = map.grid.rays()[cell];
             let point = frame.t_world_cam.cast() * Point3::new(x * z, y * z, z);
-            exact_views.iter().enumerate().any(|(other, view)| other != number && view.shows(&survey.grid, &point))
+            exact_views.iter().enumerate().any(|(other, view)| other != number && view.shows(&map.grid, &point))
         };
         for (cell, &valid) in view.valid.data().iter().enumerate() {
-            let moves = one.piece.moves(cell);
+            let moves = one.patch.moves(cell);
             cells += 1;
             known += usize::from(valid);
             hidden += usize::from(moves);

@@ -7,8 +7,8 @@
 use std::collections::HashMap;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use yfslam::dense::voxels::{Voxel, center_m, voxel_at};
-use yfslam::dense::{Survey, Volume};
+use yfslam::dense::{DenseMap, Volume};
+use yfslam::dense::{Voxel, center_m, voxel_at};
 use yfslam_synth::{SynthFrame, World};
 
 /// Distance within which two surfaces are the same, m.
@@ -66,10 +66,10 @@ pub struct ExactSurfaces {
 }
 
 /// The rigid motion from the world's frame to that of a dense map: the mean rotation between the poses, about the mean position.
-pub fn t_map_world(survey: &Survey, world: &World) -> Isometry3<f64> {
-    let exact: Vec<_> = survey.pieces.iter().map(|one| world.pose(index_of(world, one.timestamp_ns))).collect();
-    let pairs = || survey.pieces.iter().map(|one| one.t_world_cam).zip(&exact);
-    let count = survey.pieces.len().max(1) as f64;
+pub fn t_map_world(map: &DenseMap, world: &World) -> Isometry3<f64> {
+    let exact: Vec<_> = map.patches.iter().map(|one| world.pose(index_of(world, one.timestamp_ns))).collect();
+    let pairs = || map.patches.iter().map(|one| one.t_world_cam).zip(&exact);
+    let count = map.patches.len().max(1) as f64;
     let mean = |sum: Vector3<f64>| sum / count;
     let center = mean(pairs().map(|(pose, _)| pose.translation.vector).sum());
     let center_exact = mean(pairs().map(|(_, exact)| exact.translation.vector).sum());
@@ -82,10 +82,10 @@ pub fn t_map_world(survey: &Survey, world: &World) -> Isometry3<f64> {
 }
 
 /// The dense map that a run without drift would have made.
-pub fn with_exact_poses(survey: &Survey, world: &World) -> Survey {
-    let alignment = t_map_world(survey, world);
-    let mut exact = survey.clone();
-    for one in &mut exact.pieces {
+pub fn with_exact_poses(map: &DenseMap, world: &World) -> DenseMap {
+    let alignment = t_map_world(map, world);
+    let mut exact = map.clone();
+    for one in &mut exact.patches {
         one.t_world_cam = alignment * world.pose(index_of(world, one.timestamp_ns));
     }
     exact
@@ -98,12 +98,12 @@ pub fn index_of(world: &World, timestamp_ns: i64) -> usize {
 
 impl ExactSurfaces {
     /// The surfaces in the views of a dense map.
-    pub fn of(survey: &Survey, volume: &Volume, world: &World) -> Self {
+    pub fn of(map: &DenseMap, volume: &Volume, world: &World) -> Self {
         let mut surfaces = Self::default();
-        let Some(first) = survey.pieces.first() else { return surfaces };
+        let Some(first) = map.patches.first() else { return surfaces };
         let Some(pose) = volume.pose(0) else { return surfaces };
-        let alignment = pose * first.t_world_cam.inverse() * t_map_world(survey, world);
-        for one in &survey.pieces {
+        let alignment = pose * first.t_world_cam.inverse() * t_map_world(map, world);
+        for one in &map.patches {
             let frame = world.frame(index_of(world, one.timestamp_ns));
             surfaces.add(&frame, world, &alignment, volume.config().max_range_m);
         }
@@ -122,7 +122,7 @@ impl ExactSurfaces {
                     self.moving.insert(p);
                 } else {
                     self.fixed.insert(p);
-                    if frame.frame.depth.metres(u, v).is_some() {
+                    if frame.frame.depth.as_ref().is_some_and(|depth| depth.metres(u, v).is_some()) {
                         self.measured.insert(p);
                     }
                 }

@@ -10,8 +10,8 @@ use clap::Args;
 use dense_run::{DenseRun, RunOptions, run_all};
 use ghost_metrics::{ExactSurfaces, with_exact_poses};
 use wall_thickness::wall_thickness;
-use yfslam::dense::{DenseConfig, up};
-use yfslam::dynamic::Method;
+use yfslam::Method;
+use yfslam::dense::{DenseConfig, Up};
 use yfslam_synth::{World, parse};
 
 use crate::row::Row;
@@ -60,18 +60,18 @@ pub fn measure(arguments: &Arguments) -> Result<Vec<Row>> {
 }
 
 fn row(spec: &str, method: &str, run: &DenseRun, world: &World, config: &DenseConfig) -> Result<Row> {
-    let DenseRun { survey, ms_per_keyframe, bytes } = run;
-    let volume = survey.volume(config, &up::of_survey(survey), |_| {});
-    let occupancy = ExactSurfaces::of(survey, &volume, world).compare(&volume);
-    let exact = with_exact_poses(survey, world);
-    let [thickness, exact_thickness] = [survey, &exact].map(|survey| wall_thickness(survey, world, config));
-    let exact = exact.volume(config, &up::of_survey(survey), |_| {});
+    let DenseRun { map, ms_per_keyframe, bytes } = run;
+    let volume = map.volume(config, &map.turn(Up::Level), |_| {})?;
+    let occupancy = ExactSurfaces::of(map, &volume, world).compare(&volume);
+    let exact = with_exact_poses(map, world);
+    let (thickness, exact_thickness) = (wall_thickness(map, world, config)?, wall_thickness(&exact, world, config)?);
+    let exact = exact.volume(config, &map.turn(Up::Level), |_| {})?;
     let exact_occupied = exact.voxels().filter(|voxel| voxel.occupied).count();
-    let background = background_metrics::compare(survey, &volume, world)?;
+    let background = background_metrics::compare(map, &volume, world)?;
     Ok(Row::new()
         .case("world", spec)
         .case("method", method)
-        .figure("keyframe_patches", survey.pieces.len())
+        .figure("keyframe_patches", map.patches.len())
         .figure("occupied", occupancy.occupied)
         .figure("of_exact_poses", occupancy.occupied as f64 / exact_occupied.max(1) as f64)
         .figure("wall_patches", thickness.patches)

@@ -7,9 +7,9 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use yfslam::dense::cloud::cloud;
-use yfslam::dense::voxels::{Voxel, voxel_at};
-use yfslam::dense::{DenseConfig, Survey};
+use yfslam::dense::cloud;
+use yfslam::dense::{DenseConfig, DenseError, DenseMap};
+use yfslam::dense::{Voxel, voxel_at};
 use yfslam_synth::World;
 
 use super::ghost_metrics::index_of;
@@ -42,10 +42,13 @@ pub struct Thickness {
 }
 
 /// Measures the cloud of a dense map.
-pub fn wall_thickness(survey: &Survey, world: &World, config: &DenseConfig) -> Thickness {
-    let volume = survey.volume(config, &UnitQuaternion::identity(), |_| {});
+///
+/// # Errors
+/// The volume would take more memory than is allowed.
+pub fn wall_thickness(map: &DenseMap, world: &World, config: &DenseConfig) -> Result<Thickness, DenseError> {
+    let volume = map.volume(config, &UnitQuaternion::identity(), |_| {})?;
     let mut near: BTreeMap<Voxel, Vec<Point3<f32>>> = BTreeMap::new();
-    for point in cloud(survey, &volume, |_| {}) {
+    for point in cloud(map, &volume, |_| {}) {
         let p = Point3::from(point.position_m);
         near.entry(voxel_at(&p, 1.0 / ACROSS_M)).or_default().push(p);
     }
@@ -60,15 +63,15 @@ pub fn wall_thickness(survey: &Survey, world: &World, config: &DenseConfig) -> T
         let [low, high] = members.fold([f32::MAX, f32::MIN], |[low, high], v| [low.min(v), high.max(v)]);
         (low <= high).then(|| f64::from(high - low))
     };
-    let extents: Vec<f64> = patches(survey, world, config).filter_map(|patch| extent(&patch)).collect();
-    Thickness { patches: extents.len(), mean_m: extents.iter().sum::<f64>() / extents.len().max(1) as f64 }
+    let extents: Vec<f64> = patches(map, world, config).filter_map(|patch| extent(&patch)).collect();
+    Ok(Thickness { patches: extents.len(), mean_m: extents.iter().sum::<f64>() / extents.len().max(1) as f64 })
 }
 
 /// The patches that both halves of the sequence have seen, in the order of their positions in the world.
-fn patches(survey: &Survey, world: &World, config: &DenseConfig) -> impl Iterator<Item = Patch> {
+fn patches(map: &DenseMap, world: &World, config: &DenseConfig) -> impl Iterator<Item = Patch> {
     let camera = &world.config().camera;
     let mut patches: BTreeMap<Voxel, Patch> = BTreeMap::new();
-    for one in &survey.pieces {
+    for one in &map.patches {
         let index = index_of(world, one.timestamp_ns);
         let (half, frame) = (2 * index / world.len().max(1), world.frame(index));
         let (in_map, in_world) = (one.t_world_cam.cast::<f32>(), frame.t_world_cam.cast::<f32>());

@@ -3,7 +3,7 @@
 
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
-use yfslam::features::Descriptor;
+use yfslam::unstable::Descriptor;
 
 /// Number of children of a node.
 const BRANCHES: usize = 10;

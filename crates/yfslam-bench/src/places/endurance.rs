@@ -42,7 +42,7 @@ pub fn measure(
                     .figure("ate_live_m", sequence.ate_m(&live)?),
             );
         }
-        slam.map().validate().map_err(anyhow::Error::msg)?;
+        yfslam::unstable::check_map(slam.map()).map_err(anyhow::Error::msg)?;
     }
     Ok(rows)
 }

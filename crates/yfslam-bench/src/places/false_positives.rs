@@ -1,9 +1,7 @@
 //! Relocalisation in places that are not in the map: how often they are taken for places that are.
 
 use anyhow::Result;
-use yfslam::image::RgbImage;
-use yfslam::map::persist::decode;
-use yfslam::{Config, MapUse, RgbdFrame};
+use yfslam::{Config, MapUse, RgbImage, SavedMap};
 use yfslam_eval::{AlignmentKind, StampedPose, align, associate};
 
 use super::sequence::LoadedSequence;
@@ -30,7 +28,7 @@ pub fn measure(
     let mut rows = Vec::new();
     for sequence in sequences {
         let sequence = sequence?;
-        let (slam, mapped) = sequence.mapped(config, mapped)?;
+        let (mut slam, mapped) = sequence.mapped(config, mapped)?;
         let estimate: Vec<_> = slam.trajectory().iter().map(|(t, pose)| StampedPose::new(*t, *pose)).collect();
         let true_pose = |played| {
             let timestamp_ns = sequence.stamp_ns(played);
@@ -38,13 +36,16 @@ pub fn measure(
         };
         let truth: Vec<_> = (0..sequence.len()).filter_map(true_pose).collect();
         let alignment = align(&associate(&truth, &estimate, 0)?, AlignmentKind::Se3)?;
-        let mut slam = sequence.slam(config)?.with_map(decode(&slam.save_map()?)?, MapUse::Localise)?;
+        let saved = SavedMap::from_bytes(&slam.save_map()?)?;
+        let mut slam = sequence.builder(config).map(saved, MapUse::Localise).build()?;
         let [mut inside, mut later] = [Counts::default(), Counts::default()];
         for (number, frame) in (0..sequence.len()).step_by(STEP).enumerate() {
             let counts = if frame < mapped { &mut inside } else { &mut later };
             counts.tried += 1;
             let timestamp_ns = 2 * number as i64 * sequence.period_ns();
-            let tracked = slam.track(&RgbdFrame { timestamp_ns, ..sequence.play(frame) })?;
+            let mut played = sequence.play(frame);
+            played.timestamp_ns = timestamp_ns;
+            let tracked = slam.track(&played)?;
             if let (Some(pose), Some(truth)) = (tracked.t_world_cam, sequence.true_pose_at(sequence.stamp_ns(frame))) {
                 let estimated = alignment.apply(&StampedPose::new(0, pose)).t_world_cam;
                 let error = size(&(truth.inverse() * estimated));
@@ -57,11 +58,9 @@ pub fn measure(
             }
             // A dark image, so that the next frame is relocalised and not tracked.
             let dark = RgbImage::new(sequence.camera.width, sequence.camera.height);
-            slam.track(&RgbdFrame {
-                timestamp_ns: timestamp_ns + sequence.period_ns(),
-                color: dark.into(),
-                ..sequence.play(frame)
-            })?;
+            played.timestamp_ns += sequence.period_ns();
+            played.color = dark.into();
+            slam.track(&played)?;
         }
         rows.push(
             Row::new()

@@ -4,8 +4,7 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use yfslam::map::persist::decode;
-use yfslam::{Config, Execution, MapUse, Slam};
+use yfslam::{Config, Execution, MapUse, SavedMap, Slam};
 
 use super::sequence::LoadedSequence;
 use crate::row::Row;
@@ -18,11 +17,12 @@ pub fn measure(config: &Config, sequences: impl Iterator<Item = Result<LoadedSeq
         let begun = Instant::now();
         let mut inline = sequence.slam(config)?;
         let (_, first) = run(&sequence, &mut inline, None, begun)?;
-        let mut live = sequence.slam(config)?.with_execution(Execution::Threaded)?;
+        let mut live = sequence.builder(config).execution(Execution::Threaded).build()?;
         let period = Duration::from_nanos(sequence.period_ns() as u64);
         let (mut times, _) = run(&sequence, &mut live, Some(period), Instant::now())?;
         times.sort_by(f64::total_cmp);
-        let mut localised = sequence.slam(config)?.with_map(decode(&inline.save_map()?)?, MapUse::Localise)?;
+        let saved = SavedMap::from_bytes(&inline.save_map()?)?;
+        let mut localised = sequence.builder(config).map(saved, MapUse::Localise).build()?;
         run(&sequence, &mut localised, None, Instant::now())?;
         rows.push(
             Row::new()
@@ -33,7 +33,7 @@ pub fn measure(config: &Config, sequences: impl Iterator<Item = Result<LoadedSeq
                 .figure("frame_median_ms", times[times.len() / 2])
                 .figure("frame_p99_ms", times[times.len() * 99 / 100])
                 .figure("frame_max_ms", times[times.len() - 1])
-                .figure("keyframes_skipped", live.passed_over())
+                .figure("keyframes_skipped", live.statistics().keyframes_skipped)
                 .figure("first_pose_ms", first.unwrap_or_default().as_secs_f64() * 1e3),
         );
     }
@@ -62,6 +62,6 @@ fn run(
             first.get_or_insert(begun.elapsed());
         }
     }
-    slam.settle();
+    slam.finish_mapping();
     Ok((times, first))
 }

@@ -59,7 +59,7 @@ fn run(sequence: &LoadedSequence, config: &Config, count: usize) -> Result<(Slam
     for played in 0..count {
         let result = slam.track(&sequence.play(played))?;
         tracked += usize::from(result.t_world_cam.is_some());
-        let Some(closed) = result.loop_closed else { continue };
+        let Some(closed) = result.loop_closure else { continue };
         let true_pose = |id| sequence.true_pose_at(slam.map().keyframe(id)?.timestamp_ns);
         let error = |near: Isometry3<f64>, far: Isometry3<f64>| size(&(closed.t_keyframe_to * far.inverse() * near));
         let error = true_pose(closed.keyframe).zip(true_pose(closed.to)).map(|(near, far)| error(near, far));

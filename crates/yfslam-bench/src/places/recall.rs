@@ -3,13 +3,8 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use yfslam::Config;
-use yfslam::dynamic::Evidence;
-use yfslam::features::{Descriptor, Features, FrameFeatures, OrbExtractor};
-use yfslam::image::{GrayImage, gray_from_rgb};
-use yfslam::loops::Recogniser;
-use yfslam::map::KeyFrameId;
-use yfslam::sensor::SensorModel;
+use yfslam::unstable::{Descriptor, PlaceProbe, descriptors_of};
+use yfslam::{Config, KeyFrameId};
 
 use super::bag_of_words::{Vocabulary, similarity};
 use super::sequence::LoadedSequence;
@@ -42,28 +37,25 @@ pub fn measure(
                 m < SAME_PLACE.0 && deg < SAME_PLACE.1
             })
         };
-        let mut recogniser = Recogniser::default();
-        map.keyframes().for_each(|(id, _)| recogniser.learn(map, id));
-        let images: Vec<Vec<Descriptor>> = map.keyframes().map(|(_, k)| trusted(&k.features)).collect();
+        let images: Vec<Vec<Descriptor>> = map.keyframes().map(|(_, k)| descriptors_of(k)).collect();
         let vocabulary = Vocabulary::train(&images);
         let documents: Vec<_> =
             map.keyframes().zip(&images).map(|((id, _), image)| (id, vocabulary.words(image))).collect();
         let (mut ours, mut bag): (Vec<Best>, Vec<Best>) = (Vec::new(), Vec::new());
         let (mut ours_s, mut bag_s) = (0.0, 0.0);
-        let mut extraction = Extraction::new(&sequence, config);
+        let mut probe = PlaceProbe::new(config, &sequence.camera, map);
         for played in (mapped..sequence.len()).step_by(STEP) {
             let stamp_ns = sequence.stamp_ns(played);
             if !map.keyframes().any(|(id, _)| is_near(id, stamp_ns)) {
                 continue;
             }
-            let features = extraction.features(&sequence, config, played);
+            let descriptors = probe.extract(&sequence.play(played));
             let clock = Instant::now();
-            let candidates = recogniser.candidates(&config.places, map, features, |_| true);
+            let best = probe.best(map);
             ours_s += clock.elapsed().as_secs_f64();
-            let best = candidates.first();
-            ours.push(best.map(|best| (best.matches.len() as f64, is_near(best.keyframe, stamp_ns))));
+            ours.push(best.map(|(keyframe, matches)| (matches as f64, is_near(keyframe, stamp_ns))));
             let clock = Instant::now();
-            let query = vocabulary.words(&trusted(features));
+            let query = vocabulary.words(&descriptors);
             let scored = documents.iter().map(|(id, document)| (similarity(&query, document), *id));
             let best = scored.max_by(|a, b| a.0.total_cmp(&b.0));
             bag_s += clock.elapsed().as_secs_f64();
@@ -94,49 +86,4 @@ fn count(bests: &[Best]) -> (usize, usize) {
         bests.iter().flatten().filter(|best| !best.1).map(|best| best.0).fold(f64::NEG_INFINITY, f64::max);
     let right = bests.iter().flatten().filter(|best| best.1);
     (right.clone().count(), right.filter(|best| best.0 > highest_wrong).count())
-}
-
-/// Descriptors of features that may be static.
-fn trusted(features: &FrameFeatures) -> Vec<Descriptor> {
-    let pairs = features.features.iter().zip(&features.descriptors);
-    pairs.filter(|(feature, _)| feature.trust > 0.0).map(|(_, descriptor)| *descriptor).collect()
-}
-
-/// Extracts features as the system does; those in boxes of people are not trusted.
-struct Extraction {
-    extractor: OrbExtractor,
-    sensor: SensorModel,
-    gray: GrayImage,
-    extracted: Features,
-    features: FrameFeatures,
-}
-
-impl Extraction {
-    fn new(sequence: &LoadedSequence, config: &Config) -> Self {
-        let extractor = OrbExtractor::new(&config.features);
-        Self {
-            sensor: SensorModel::new(&sequence.camera, config, extractor.scale_factors()),
-            extractor,
-            gray: GrayImage::default(),
-            extracted: Features::default(),
-            features: FrameFeatures::default(),
-        }
-    }
-
-    fn features(&mut self, sequence: &LoadedSequence, config: &Config, played: usize) -> &FrameFeatures {
-        let frame = sequence.play(played);
-        gray_from_rgb(&frame.color, &mut self.gray);
-        self.extractor.extract(&self.gray, &mut self.extracted);
-        self.features.fill(&self.extracted, &frame.depth, &self.sensor.camera, self.sensor.bounds);
-        let evidence = Evidence {
-            movable: frame.detections.as_deref().unwrap_or_default(),
-            looked: true,
-            mask: None,
-            gray: &self.gray,
-            depth: &frame.depth,
-            sensor: &self.sensor,
-        };
-        yfslam::dynamic::Method::Boxes.filter(0).before_pose(&config.dynamic, &evidence, &mut self.features);
-        &self.features
-    }
 }

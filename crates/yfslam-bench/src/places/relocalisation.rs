@@ -6,8 +6,7 @@ use anyhow::Result;
 use nalgebra::Isometry3;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
-use yfslam::map::persist::decode;
-use yfslam::{Config, MapUse, Slam, Tracked};
+use yfslam::{Config, MapUse, SavedMap, Slam, Tracked};
 use yfslam_io::{Fault, FaultInjector, FaultKind};
 
 use super::sequence::LoadedSequence;
@@ -118,7 +117,7 @@ impl<'a> KnownSequence<'a> {
             let begun = Instant::now();
             let tracked = slam.track(&delivery.frame)?;
             let elapsed_ns = delivery.frame.timestamp_ns - first_ns;
-            let covered = fault.strikes(elapsed_ns);
+            let covered = fault.affects(elapsed_ns);
             let reference = self.poses[sequence.frame_at(played)];
             if tracked.t_world_cam.is_some_and(|pose| covered || self.is_wrong(played, &tracked, &pose)) {
                 trial.wrong = true;
@@ -156,6 +155,7 @@ impl<'a> KnownSequence<'a> {
     }
 
     fn slam_in_map(&self) -> Result<Slam> {
-        Ok(self.sequence.slam(self.config)?.with_map(decode(&self.map)?, MapUse::Extend)?)
+        let saved = SavedMap::from_bytes(&self.map)?;
+        Ok(self.sequence.builder(self.config).map(saved, MapUse::Extend).build()?)
     }
 }

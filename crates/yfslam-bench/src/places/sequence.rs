@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 use nalgebra::Isometry3;
 use rayon::prelude::*;
-use yfslam::{Camera, Config, Detector, RgbdFrame, Slam};
+use yfslam::{Camera, Config, Detector, Frame, Slam, SlamBuilder};
 use yfslam_detect::{DetectorConfig, YoloFastestV2};
 use yfslam_eval::{EvalOptions, StampedPose, evaluate};
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
@@ -20,7 +20,7 @@ pub struct LoadedSequence {
     /// Name in tables.
     pub name: String,
     pub camera: Camera,
-    frames: Vec<RgbdFrame>,
+    frames: Vec<Frame>,
     /// True poses, where they are known.
     t_world_cam: Vec<Option<Isometry3<f64>>>,
 }
@@ -56,15 +56,15 @@ impl LoadedSequence {
     fn read(spec: &str, detector: Option<&Path>, config: &Config) -> Result<Self> {
         let folder = Path::new(spec);
         let sequence = Sequence::open(folder, &SequenceOptions::default())?;
-        let camera = detect_camera(folder)?.camera;
+        let source = detect_camera(folder)?;
         let score_threshold = config.dynamic.keep_score.min(config.dynamic.open_score);
         let settings = DetectorConfig { score_threshold, ..Default::default() };
         let mut network = match detector {
             Some(file) => YoloFastestV2::from_bytes(&file.display().to_string(), &std::fs::read(file)?, &settings)?,
             None => YoloFastestV2::embedded(&settings)?,
         };
-        let mut frames: Vec<RgbdFrame> =
-            FrameStream::open(&sequence, &camera, DEFAULT_LOOK_AHEAD)?.filter_map(Result::ok).collect();
+        let mut frames: Vec<Frame> =
+            FrameStream::open(&sequence, &source, DEFAULT_LOOK_AHEAD)?.filter_map(Result::ok).collect();
         for frame in &mut frames {
             let mut detections = Vec::new();
             network.detect(&frame.color, &mut detections)?;
@@ -73,13 +73,13 @@ impl LoadedSequence {
             frame.detections = Some(detections);
         }
         let truth = TrajectoryFile::read(&folder.join("groundtruth.txt"))?.poses;
-        let true_pose = |frame: &RgbdFrame| {
+        let true_pose = |frame: &Frame| {
             let nearest = truth.iter().min_by_key(|pose| pose.timestamp_ns.abs_diff(frame.timestamp_ns))?;
             (nearest.timestamp_ns.abs_diff(frame.timestamp_ns) <= MAX_DIFFERENCE_NS).then_some(nearest.pose)
         };
         let t_world_cam = frames.iter().map(true_pose).collect();
         let name = folder.file_name().unwrap_or(folder.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, camera, frames, t_world_cam })
+        Ok(Self { name, camera: source.camera, frames, t_world_cam })
     }
 
     /// Number of frames.
@@ -100,8 +100,10 @@ impl LoadedSequence {
     }
 
     /// The frame with number `played`.
-    pub fn play(&self, played: usize) -> RgbdFrame {
-        RgbdFrame { timestamp_ns: self.stamp_ns(played), ..self.frames[self.frame_at(played)].clone() }
+    pub fn play(&self, played: usize) -> Frame {
+        let mut frame = self.frames[self.frame_at(played)].clone();
+        frame.timestamp_ns = self.stamp_ns(played);
+        frame
     }
 
     /// The time stamp of the frame with number `played`.
@@ -114,9 +116,14 @@ impl LoadedSequence {
         self.t_world_cam[self.frame_at((timestamp_ns / self.period_ns()) as usize)]
     }
 
+    /// A builder of systems for this camera.
+    pub fn builder(&self, config: &Config) -> SlamBuilder {
+        Slam::builder(self.camera.clone()).config(config.clone())
+    }
+
     /// A system for this camera.
     pub fn slam(&self, config: &Config) -> Result<Slam> {
-        Ok(Slam::new(config.clone(), &self.camera, None)?)
+        Ok(self.builder(config).build()?)
     }
 
     /// A system that has mapped the first `share` of the sequence, and the number of these frames.

@@ -5,8 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
-use yfslam::image::RgbImage;
-use yfslam::{Detection, Detector, Upright};
+use yfslam::{Detection, Detector, RgbImage, RollCompensation};
 use yfslam_detect::DetectorConfig;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
@@ -89,7 +88,7 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
         images: Vec::new(),
     };
     let mut progress = Progress::new(terminal, "detect", files.len());
-    let mut upright = Upright::default();
+    let mut upright = RollCompensation::default();
     for (index, file) in files.iter().enumerate() {
         let result = match detect(file, &mut detector, &mut upright, args.roll) {
             Ok((image, detections)) => {
@@ -183,7 +182,7 @@ fn image_folder(out: &OutputFolder) -> Result<PathBuf> {
 fn detect(
     file: &Path,
     detector: &mut InstanceDetector,
-    upright: &mut Upright,
+    upright: &mut RollCompensation,
     roll_deg: i32,
 ) -> Result<(RgbImage, Vec<Detection>)> {
     let bytes = std::fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;

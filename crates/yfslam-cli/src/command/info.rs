@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 use clap::Args;
 use yfslam::config::DepthSource;
-use yfslam::image::{Image, RgbImage};
+use yfslam::{Image, RgbImage};
 use yfslam_io::decode::{decode_color, decode_depth};
 use yfslam_io::depth::check_depth_factor;
 use yfslam_io::sequence::{AssociationReport, FrameEntry, Layout};
@@ -150,7 +150,7 @@ fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>)
         writeln!(text, "              {} of {opened} opened frames are unusable; the first: {first:#}", faults.len())?;
     }
     // Without a camera, depth units are unknown and values are raw.
-    let (factor, unit) = camera.map_or((1.0, "raw"), |source| (source.camera.depth_factor, "m"));
+    let (factor, unit) = camera.map_or((1.0, "raw"), |source| (source.depth_factor, "m"));
     let Some(d) = DepthStatistics::of(&depths, factor) else { return Ok(()) };
     writeln!(
         text,
@@ -191,7 +191,7 @@ fn describe_camera(text: &mut String, source: &CameraSource) -> Result<()> {
     writeln!(
         text,
         "              k1 {k1} k2 {k2} p1 {p1} p2 {p2} k3 {k3}; depth factor {}, bf {}",
-        c.depth_factor, c.bf
+        source.depth_factor, c.bf
     )?;
     Ok(())
 }

@@ -4,8 +4,8 @@
 //! left out, so that ceilings do not hide rooms.
 
 use nalgebra::{Point3, Vector3};
-use yfslam::dense::cloud::CloudPoint;
-use yfslam::image::{Image, RgbImage};
+use yfslam::dense::CloudPoint;
+use yfslam::{Image, RgbImage};
 
 /// Height above the floor above which images leave points out, m.
 pub const SHOWN_M: f32 = 1.9;

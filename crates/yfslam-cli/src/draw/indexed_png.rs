@@ -3,7 +3,7 @@
 use anyhow::Result;
 use color_quant::NeuQuant;
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
-use yfslam::image::RgbImage;
+use yfslam::RgbImage;
 
 use super::colors::MARKS;
 

@@ -1,6 +1,6 @@
 //! Rectangles, discs and tints on a colour image; what lies outside is clipped.
 
-use yfslam::image::{Image, RgbImage};
+use yfslam::{Image, RgbImage};
 
 /// Red, green, blue.
 pub type Color = [u8; 3];

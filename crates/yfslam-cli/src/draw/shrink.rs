@@ -1,6 +1,6 @@
 //! Smaller images.
 
-use yfslam::image::RgbImage;
+use yfslam::RgbImage;
 
 /// Wider images are made smaller: the report shows none of them larger.
 const WIDEST_PX: usize = 480;

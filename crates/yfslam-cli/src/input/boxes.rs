@@ -6,8 +6,7 @@ use std::fmt;
 
 use anyhow::{Result, bail};
 use serde::Serialize;
-use yfslam::Config;
-use yfslam::dynamic::Method;
+use yfslam::{Config, Method};
 
 use crate::input::detector::{self, DetectorArgs, LoadedDetector, ModelIdentity};
 use crate::input::settings::describe;
@@ -64,7 +63,7 @@ pub fn choose(
         return Ok((BoxOrigin::None, None));
     }
     if args.detector.is_none() && source.masks.is_some() {
-        if let Some(method) = methods.iter().find(|method| matches!(method, Method::Boxes | Method::Yf)) {
+        if let Some(method) = methods.iter().find(|method| matches!(method, Method::Boxes | Method::YfSlam)) {
             let (name, _) = describe(*method);
             bail!(
                 "method {name} needs boxes and cannot use masks; add --detector embedded, or leave it out of --method"

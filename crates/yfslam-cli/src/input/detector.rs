@@ -12,8 +12,7 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use yfslam::image::{Image, RgbImage};
-use yfslam::{Config, Detection, Detector, DetectorError};
+use yfslam::{Config, Detection, Detector, DetectorError, Image, RgbImage};
 use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, Network, YoloFastestV2};
 
 use crate::stats::cpu;

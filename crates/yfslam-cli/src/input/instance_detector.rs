@@ -2,8 +2,7 @@
 //!
 //! In: a network. Out: a detector whose mask shows instances.
 
-use yfslam::image::{Image, RgbImage};
-use yfslam::{Detection, Detector, DetectorError};
+use yfslam::{Detection, Detector, DetectorError, Image, RgbImage};
 use yfslam_detect::Network;
 
 /// A network whose detections have a class number for each object, under the name of the object's class. Its mask holds these numbers,
@@ -56,7 +55,7 @@ impl Detector for InstanceDetector {
 
 #[cfg(test)]
 mod tests {
-    use yfslam::{BoundingBox, Upright};
+    use yfslam::{BoundingBox, RollCompensation};
 
     use super::*;
 
@@ -94,7 +93,7 @@ mod tests {
         for (roll, above) in [(0, 1), (180, 2)] {
             let mut instances =
                 InstanceDetector::new(Box::new(Dogs(vec!["cat".into(), "dog".into()], Image::default())));
-            let (mut upright, mut found) = (Upright::default(), Vec::new());
+            let (mut upright, mut found) = (RollCompensation::default(), Vec::new());
             upright.detect(&mut instances, &RgbImage::new(40, 30), roll, &mut found).unwrap();
             assert_eq!(instances.class_names(), ["dog", "dog"]);
             assert_eq!(found.iter().map(|detection| detection.class).collect::<Vec<_>>(), [0, 1]);

@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum, value_parser};
-use yfslam::Config;
-use yfslam::dynamic::Method;
-use yfslam::dynamic::depth_group::Grouping;
+use yfslam::config::Grouping;
+use yfslam::{Config, Method};
 
 /// Settings of the system.
 #[derive(Args, Clone, Debug, Default)]
@@ -63,10 +62,10 @@ impl MethodArg {
         match self {
             Self::None => Method::None,
             Self::Boxes => Method::Boxes,
-            Self::Yf => Method::Yf,
-            Self::Ds => Method::Ds,
-            Self::Dyna => Method::Dyna,
-            Self::Dms => Method::Dms,
+            Self::Yf => Method::YfSlam,
+            Self::Ds => Method::DsSlam,
+            Self::Dyna => Method::DynaSlam,
+            Self::Dms => Method::DmsSlam,
             Self::Full => Method::Full,
         }
     }
@@ -77,10 +76,10 @@ pub fn describe(method: Method) -> (&'static str, &'static str) {
     match method {
         Method::None => ("none", "all features are trusted"),
         Method::Boxes => ("boxes", "features in boxes of people are dropped"),
-        Method::Yf => ("yf", "the depth group of a person is dropped, the background is kept"),
-        Method::Ds => ("ds", "moving people are dropped, as in DS-SLAM"),
-        Method::Dyna => ("dyna", "people and what is nearer than in earlier keyframes are dropped, as in DynaSLAM"),
-        Method::Dms => ("dms", "features that do not move like their neighbours are dropped, as in DMS-SLAM"),
+        Method::YfSlam => ("yf", "the depth group of a person is dropped, the background is kept"),
+        Method::DsSlam => ("ds", "moving people are dropped, as in DS-SLAM"),
+        Method::DynaSlam => ("dyna", "people and what is nearer than in earlier keyframes are dropped, as in DynaSLAM"),
+        Method::DmsSlam => ("dms", "features that do not move like their neighbours are dropped, as in DMS-SLAM"),
         Method::Full => ("full", "segmented people and whatever else has moved are dropped"),
     }
 }

@@ -3,8 +3,8 @@
 use std::fmt;
 
 use serde::Serialize;
+use yfslam::dense::Classes;
 use yfslam::dense::Volume;
-use yfslam::dense::classes::Classes;
 
 use crate::draw::colors::class_color;
 

@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use anyhow::Result;
-use yfslam::dense::cloud::cloud;
-use yfslam::dense::{DenseConfig, Survey, up};
-use yfslam::image::RgbImage;
+use yfslam::RgbImage;
+use yfslam::dense::{DenseConfig, DenseMap, Up, cloud};
 use yfslam_io::write_atomically;
-use yfslam_report::DenseMap;
+use yfslam_report::DenseMapImages;
 
 use crate::draw::dense_image::{SHOWN_M, from_above, from_corner};
 use crate::draw::indexed_png::to_png;
@@ -18,7 +17,7 @@ pub const DENSE_FILE: &str = "dense.map";
 /// Width and height of the images in the report, px.
 const IMAGE_PX: [usize; 2] = [480, 360];
 
-/// Writes the dense map, as [`yfslam::dense::persist::encode`] gives it, into the output folder.
+/// Writes the dense map, as [`DenseMap::to_bytes`] gives it, into the output folder.
 ///
 /// # Errors
 /// The file cannot be written; an earlier file then stays.
@@ -29,17 +28,17 @@ pub fn write(folder: &Path, encoded: &[u8]) -> Result<()> {
 /// Draws the dense map for the report.
 ///
 /// # Errors
-/// An image is too large for PNG.
-pub fn images(config: &DenseConfig, map: &Survey) -> Result<DenseMap> {
-    let turn = up::of_survey(map);
-    let volume = map.volume(config, &turn, |_| {});
+/// The map would take more memory than is allowed, or an image is too large for PNG.
+pub fn images(config: &DenseConfig, map: &DenseMap) -> Result<DenseMapImages> {
+    let turn = map.turn(Up::Level);
+    let volume = map.volume(config, &turn, |_| {})?;
     let points = cloud(map, &volume, |_| {});
-    let cut_m = up::floor_m(map, &turn).unwrap_or_default() as f32 + SHOWN_M;
+    let cut_m = map.floor_m(&turn).unwrap_or_default() as f32 + SHOWN_M;
     let above = from_above(&points, config.resolution_m, cut_m, IMAGE_PX);
     let corner = from_corner(&points, config.resolution_m, cut_m, IMAGE_PX);
     let png = |image: &RgbImage| -> Result<_> { Ok((to_png(image)?, [image.width(), image.height()])) };
-    Ok(DenseMap {
-        keyframes: map.pieces.len(),
+    Ok(DenseMapImages {
+        keyframes: map.patches.len(),
         occupied: volume.voxels().filter(|known| known.occupied).count(),
         resolution_m: config.resolution_m,
         views: [png(&above)?, png(&corner)?],

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use serde::Serialize;
-use yfslam::Detection;
-use yfslam::image::{Image, RgbImage};
+use yfslam::{Detection, Image, RgbImage};
 use yfslam_io::write_atomically;
 
 use super::rle::Rle;

@@ -5,9 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use yfslam::dynamic::Region;
-use yfslam::image::{DepthImage, RgbImage};
-use yfslam::{BoundingBox, RgbdFrame, Slam};
+use yfslam::{BoundingBox, DepthImage, Frame, Region, RgbImage, Slam};
 use yfslam_io::write::write_color_png;
 
 use super::folder::remove_files;
@@ -36,30 +34,29 @@ impl Overlay {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&self, index: usize, frame: &RgbdFrame, slam: &Slam) -> Result<()> {
+    pub fn write(&self, index: usize, frame: &Frame, slam: &Slam) -> Result<()> {
         let image = draw_frame(frame, slam, self.open_score);
         Ok(write_color_png(&self.folder.join(format!("{index:06}.png")), &image)?)
     }
 }
 
 /// Draws the frame that `slam` tracked last; boxes from `open_score` on open a track.
-pub fn draw_frame(frame: &RgbdFrame, slam: &Slam, open_score: f32) -> RgbImage {
+pub fn draw_frame(frame: &Frame, slam: &Slam, open_score: f32) -> RgbImage {
     let mut image = RgbImage::clone(&frame.color);
     for region in slam.moving_regions() {
-        tint_region(&mut image, region, &frame.depth);
+        tint_region(&mut image, region, frame.depth.as_deref());
     }
-    for detection in slam.last_boxes() {
+    for detection in slam.detections() {
         outline(&mut image, &detection.bbox, if detection.score >= open_score { BOX } else { WEAK_BOX });
     }
     for region in slam.moving_regions() {
         outline(&mut image, &region.bbox, DYNAMIC);
     }
-    let tracked = slam.last_frame();
-    for (feature, matched) in tracked.features.features.iter().zip(&tracked.sights) {
-        match matched {
+    for (index, feature) in slam.features().iter().enumerate() {
+        match slam.is_matched(index) {
             _ if feature.trust <= 0.0 => disc(&mut image, feature.raw, 2.0, DYNAMIC),
-            Some(_) => ring(&mut image, feature.raw, 1.5, 2.5, STATIC),
-            None => disc(&mut image, feature.raw, 1.0, UNMATCHED),
+            true => ring(&mut image, feature.raw, 1.5, 2.5, STATIC),
+            false => disc(&mut image, feature.raw, 1.0, UNMATCHED),
         }
     }
     image
@@ -71,13 +68,13 @@ fn is_overlay(name: &str) -> bool {
 }
 
 /// Tints the pixels at the depth of the moving object; all pixels of the box if the region has no range of depth.
-fn tint_region(image: &mut RgbImage, region: &Region, depth: &DepthImage) {
+fn tint_region(image: &mut RgbImage, region: &Region, depth: Option<&DepthImage>) {
     let BoundingBox { x_min, y_min, x_max, y_max } = region.bbox;
     // A float cast saturates, and the size of the image bounds the rest.
     for y in y_min as usize..(y_max as usize).min(image.height()) {
         for x in x_min as usize..(x_max as usize).min(image.width()) {
             let moves = match region.depth_m {
-                Some([near, far]) => depth.metres(x, y).is_some_and(|z| z >= near && z <= far),
+                Some([near, far]) => depth.and_then(|depth| depth.metres(x, y)).is_some_and(|z| z >= near && z <= far),
                 None => true,
             };
             if moves {

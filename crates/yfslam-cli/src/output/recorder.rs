@@ -3,8 +3,8 @@
 //! In: every tracked frame, then the run's result. Out: the files of the output folder, and the images for the report.
 
 use anyhow::Result;
-use yfslam::{Config, RgbdFrame, Slam};
-use yfslam_report::{DenseMap, Snapshot};
+use yfslam::{Config, Frame, Slam};
+use yfslam_report::{DenseMapImages, Snapshot};
 
 use super::dense;
 use super::folder::OutputFolder;
@@ -33,7 +33,7 @@ pub struct Recorder {
 #[derive(Clone, Debug, Default)]
 pub struct ReportImages {
     pub snapshots: Vec<Snapshot>,
-    pub dense: Option<DenseMap>,
+    pub dense: Option<DenseMapImages>,
 }
 
 impl Recorder {
@@ -56,7 +56,7 @@ impl Recorder {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn record(&mut self, index: usize, frame: &RgbdFrame, slam: &Slam) -> Result<()> {
+    pub fn record(&mut self, index: usize, frame: &Frame, slam: &Slam) -> Result<()> {
         if let Some(snapshots) = &mut self.snapshots {
             snapshots.record(index, frame, slam);
         }

@@ -1,7 +1,7 @@
 //! Run-length encoding of masks, in the uncompressed form of the COCO data set (Lin et al., ECCV 2014).
 
 use serde::Serialize;
-use yfslam::image::Image;
+use yfslam::Image;
 
 /// A mask as lengths of runs.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

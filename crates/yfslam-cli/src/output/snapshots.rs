@@ -4,8 +4,7 @@
 //! that methods on the same frames show the same ones.
 
 use anyhow::Result;
-use yfslam::image::RgbImage;
-use yfslam::{RgbdFrame, Slam};
+use yfslam::{Frame, RgbImage, Slam};
 use yfslam_report::Snapshot as ReportSnapshot;
 
 use super::overlay::draw_frame;
@@ -40,8 +39,8 @@ impl Snapshots {
     }
 
     /// Takes a snapshot of the frame that `slam` tracked last, if one is planned or it is the most crowded frame so far.
-    pub fn record(&mut self, index: usize, frame: &RgbdFrame, slam: &Slam) {
-        let boxes = slam.last_boxes().iter().filter(|d| d.score >= self.open_score);
+    pub fn record(&mut self, index: usize, frame: &Frame, slam: &Slam) {
+        let boxes = slam.detections().iter().filter(|d| d.score >= self.open_score);
         let covered: f32 = boxes.map(|d| d.bbox.area()).sum();
         if covered > self.crowded.as_ref().map_or(0.0, |(most, _)| *most) {
             self.crowded = Some((covered, Snapshot::new(index, frame, slam, self.open_score)));
@@ -68,8 +67,8 @@ impl Snapshots {
 }
 
 impl Snapshot {
-    fn new(index: usize, frame: &RgbdFrame, slam: &Slam, open_score: f32) -> Self {
-        let features = &slam.last_frame().features.features;
+    fn new(index: usize, frame: &Frame, slam: &Slam, open_score: f32) -> Self {
+        let features = slam.features();
         let dynamic = features.iter().filter(|f| f.trust <= 0.0).count();
         let image = shrink(draw_frame(frame, slam, open_score));
         Self { frame: index, image, features: [features.len() - dynamic, dynamic] }

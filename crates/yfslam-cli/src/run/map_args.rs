@@ -1,14 +1,10 @@
 //! Saved maps: where a run's map comes from, where it is saved, and on which thread mapping runs.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use yfslam::dense::Survey;
-use yfslam::dense::persist::decode as decode_dense;
-use yfslam::map::persist::decode;
-use yfslam::packed::PIECES;
-use yfslam::{Execution, MapUse, Slam};
+use yfslam::{Execution, MapUse, SavedMap, Slam, SlamBuilder};
 use yfslam_io::write_atomically;
 
 use super::pipeline::Pipeline;
@@ -47,16 +43,25 @@ impl MapArgs {
         if self.threaded { Execution::Threaded } else { Execution::Inline }
     }
 
-    /// Applies the options to `slam`.
+    /// Builds the system with these options.
     ///
     /// # Errors
-    /// The file cannot be read, is not a map, or was made with other settings or, to be extended, with another camera.
-    pub fn apply(&self, slam: Slam) -> Result<Slam> {
-        let slam = slam.with_execution(self.execution())?;
-        let Some(path) = &self.load_map else { return Ok(slam) };
+    /// The file cannot be read, is not a map, was made with other settings or, to be extended, with another camera; or it has a dense map
+    /// that this run would not save with it.
+    pub fn build(&self, builder: SlamBuilder, makes_dense_map: bool) -> Result<Slam> {
+        let builder = builder.execution(self.execution());
+        let Some(path) = &self.load_map else { return Ok(builder.build()?) };
         let map_use = if self.localise { MapUse::Localise } else { MapUse::Extend };
-        let saved = decode(&read(path)?).with_context(|| format!("{} cannot be used as a map", path.display()))?;
-        slam.with_map(saved, map_use).with_context(|| format!("the map {} cannot be used here", path.display()))
+        let bytes = std::fs::read(path).with_context(|| format!("the map {} cannot be read", path.display()))?;
+        let saved =
+            SavedMap::from_bytes(&bytes).with_context(|| format!("{} cannot be used as a map", path.display()))?;
+        ensure!(
+            makes_dense_map || self.save_map.is_none() || saved.dense().is_none(),
+            "{} holds a dense map, which only a run with --dense continues; add --dense, or leave out --save-map",
+            path.display()
+        );
+        let built = builder.map(saved, map_use).build();
+        built.with_context(|| format!("the map {} cannot be used here", path.display()))
     }
 
     /// Checks before a run that the map can be written after it.
@@ -76,38 +81,13 @@ impl MapArgs {
         Ok(())
     }
 
-    /// Writes the map if that was asked for, behind the dense map, if there is one.
+    /// Writes the map, with the dense map if there is one, if that was asked for.
     ///
     /// # Errors
     /// The file cannot be written; an earlier file then stays.
-    pub fn save(&self, pipeline: &mut Pipeline, dense: Option<&[u8]>) -> Result<()> {
+    pub fn save(&self, pipeline: &mut Pipeline) -> Result<()> {
         let Some(path) = &self.save_map else { return Ok(()) };
         let map = pipeline.save_map()?;
-        Ok(write_atomically(path, |file| {
-            file.write_all(dense.unwrap_or_default()).and_then(|()| file.write_all(&map))
-        })?)
+        Ok(write_atomically(path, |file| file.write_all(&map))?)
     }
-
-    /// Returns the dense map in the file whose map is extended, if it has one and this run continues it.
-    ///
-    /// # Errors
-    /// The file cannot be read, or is to be saved by a run that would leave its dense map out.
-    pub fn dense_map(&self, makes_dense_map: bool) -> Result<Option<Survey>> {
-        let is_continued = !self.localise && (makes_dense_map || self.save_map.is_some());
-        let Some(path) = self.load_map.as_ref().filter(|_| is_continued) else { return Ok(None) };
-        let bytes = read(path)?;
-        if !PIECES.begins(&bytes) {
-            return Ok(None);
-        }
-        ensure!(
-            makes_dense_map,
-            "{} holds a dense map, which only a run with --dense continues; add --dense, or leave out --save-map",
-            path.display()
-        );
-        decode_dense(&bytes).map(Some).with_context(|| format!("{} cannot be used as a map", path.display()))
-    }
-}
-
-fn read(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).with_context(|| format!("the map {} cannot be read", path.display()))
 }

@@ -3,11 +3,10 @@
 //! In: frames, which several methods may share. Out: a [`RunResult`].
 
 use anyhow::Result;
-use yfslam::tracking::TrackingState;
-use yfslam::{Config, Detector, Execution, RgbdFrame, Slam};
+use yfslam::{Config, Detector, Execution, Frame, Slam, TrackingState};
 use yfslam_eval::{AlignmentKind, EvalError, EvalOptions, Evaluation, ExpectedFrames};
 
-use super::dense::{DenseCost, DenseResult, DenseRun};
+use super::dense::{DenseCost, DenseResult};
 use super::evaluation::evaluate_possible;
 use super::map_args::MapArgs;
 use super::pipeline::{Outcome, Pipeline};
@@ -24,7 +23,7 @@ pub struct MethodRun {
     pub config: Config,
     pub pipeline: Pipeline,
     pub state: TrackingState,
-    dense: Option<DenseRun>,
+    makes_dense_map: bool,
 }
 
 /// What a run is evaluated with.
@@ -68,25 +67,22 @@ impl MethodRun {
         map: &MapArgs,
     ) -> Result<Self> {
         let (detector, times) = detector.map(|d| (d.detector as Box<dyn Detector>, d.times)).unzip();
-        let earlier = map.dense_map(makes_dense_map)?;
-        let slam = map.apply(Slam::new(config.clone(), &source.camera.camera, detector)?)?;
+        let mut builder = Slam::builder(source.camera.camera.clone()).config(config.clone());
+        if let Some(detector) = detector {
+            builder = builder.detector(detector);
+        }
+        if makes_dense_map {
+            builder = builder.dense(config.dense.clone());
+        }
+        let slam = map.build(builder, makes_dense_map)?;
         let pipeline = Pipeline::new(slam, map.execution() == Execution::Inline, times);
-        let (camera, execution) = (&source.camera.camera, map.execution());
-        let dense = makes_dense_map
-            .then(|| DenseRun::new(&config.dense, camera, execution, earlier, pipeline.slam()))
-            .transpose()?;
-        Ok(Self { config, pipeline, dense, state: TrackingState::default() })
+        Ok(Self { config, pipeline, makes_dense_map, state: TrackingState::default() })
     }
 
     /// Tracks one frame, or counts one that cannot be used.
-    pub fn process(&mut self, frame: &Result<RgbdFrame, Skip>) {
+    pub fn process(&mut self, frame: &Result<Frame, Skip>) {
         match frame {
-            Ok(frame) => {
-                self.state = self.pipeline.track(frame);
-                if let Some(dense) = &mut self.dense {
-                    dense.insert(frame, &mut self.pipeline);
-                }
-            }
+            Ok(frame) => self.state = self.pipeline.track(frame),
             Err(skip) => self.pipeline.skip(skip.clone()),
         }
     }
@@ -96,10 +92,10 @@ impl MethodRun {
     /// # Errors
     /// There is no trajectory, with the reason, or the map cannot be written.
     pub fn finish<'a>(self, context: EvalContext<'a>, map: &MapArgs) -> Result<(RunResult<'a>, Option<DenseResult>)> {
-        let Self { config, mut pipeline, dense, .. } = self;
-        let dense_cost = dense.as_ref().map(DenseRun::cost);
-        let dense = dense.map(|dense| DenseResult::new(dense.finish(&mut pipeline))).transpose()?;
-        map.save(&mut pipeline, dense.as_ref().map(|dense| dense.encoded.as_slice()))?;
+        let Self { config, mut pipeline, makes_dense_map, .. } = self;
+        let dense_cost = makes_dense_map.then(|| pipeline.dense_cost());
+        let dense = makes_dense_map.then(|| pipeline.dense_map()).transpose()?;
+        map.save(&mut pipeline)?;
         let mut outcome = pipeline.finish(&config)?;
         let mut shared = context.reading.clone();
         let needs_boxes = config.dynamic.method.needs_boxes();

@@ -7,13 +7,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use yfslam::config::DepthSource;
-use yfslam::geometry::Pose;
-use yfslam::tracking::TrackingState;
-use yfslam::{Config, RgbdFrame, Slam, Tracked};
+use yfslam::{Config, Frame, Pose, Slam, Tracked, TrackingState};
 use yfslam_io::StampedPose;
 use yfslam_io::time::format_stamp;
 use yfslam_io::write::PlyPoint;
 
+use super::dense::{DenseCost, DenseResult};
 use crate::input::detector::DetectorTime;
 use crate::stats::cpu;
 use crate::stats::process::{Part, Parts};
@@ -32,7 +31,8 @@ pub struct Pipeline {
     recognition: RecognitionTally,
     live: Vec<StampedPose>,
     resets: usize,
-    made_keyframe: bool,
+    /// Patches of the dense map.
+    dense_patches: usize,
     detector_times: Option<Receiver<DetectorTime>>,
     parts: Parts,
     maps_inline: bool,
@@ -73,7 +73,7 @@ impl Pipeline {
             recognition: RecognitionTally::default(),
             live: Vec::new(),
             resets: 0,
-            made_keyframe: false,
+            dense_patches: 0,
             detector_times,
             parts: Parts::default(),
             maps_inline,
@@ -84,10 +84,9 @@ impl Pipeline {
     }
 
     /// Tracks one frame and returns the state after it; a frame that SLAM refuses is counted as skipped.
-    pub fn track(&mut self, frame: &RgbdFrame) -> TrackingState {
+    pub fn track(&mut self, frame: &Frame) -> TrackingState {
         let started = Instant::now();
         let (result, cpu) = cpu::timed(|| self.slam.track(frame));
-        self.made_keyframe = result.as_ref().is_ok_and(|tracked| tracked.is_keyframe);
         let tracked = match result {
             Ok(tracked) => tracked,
             Err(rejected) => {
@@ -103,9 +102,9 @@ impl Pipeline {
         self.frames.count(tracked.state);
         self.dynamic.count(&self.slam);
         self.recognition.count(&tracked);
-        if self.slam.resets() > self.resets {
+        if self.slam.statistics().resets > self.resets {
             // A new map has another world frame: earlier poses do not belong to this trajectory.
-            self.resets = self.slam.resets();
+            self.resets = self.slam.statistics().resets;
             self.live.clear();
             self.frames.restart();
         }
@@ -128,14 +127,18 @@ impl Pipeline {
         &self.slam
     }
 
-    /// Counts processor time of the dense map.
-    pub fn add_dense(&mut self, took: Duration) {
-        self.parts.add(Part::Dense, took);
+    /// Returns the cost of the dense map so far.
+    pub fn dense_cost(&self) -> DenseCost {
+        DenseCost::new(&self.slam.statistics(), self.dense_patches, self.parts.get(Part::Dense))
     }
 
-    /// Returns whether the last frame became a keyframe.
-    pub fn made_keyframe(&self) -> bool {
-        self.made_keyframe
+    /// Waits until mapping is finished, and returns the dense map.
+    ///
+    /// # Errors
+    /// The system makes none, or it cannot be encoded.
+    pub fn dense_map(&mut self) -> Result<DenseResult> {
+        self.finish_mapping();
+        DenseResult::new(self.slam.dense()?.snapshot())
     }
 
     /// Returns the counts of frames so far.
@@ -165,26 +168,33 @@ impl Pipeline {
         }
         self.stages.push("dynamic filter", times.dynamic);
         self.stages.push("tracking", times.tracking);
-        if !times.places.is_zero() {
-            self.stages.push("relocalisation and loops", times.places);
+        if !times.loops.is_zero() {
+            self.stages.push("relocalisation and loops", times.loops);
         }
         if !times.mapping.is_zero() {
             self.stages.push("mapping", times.mapping);
         }
+        if !times.dense_map.is_zero() {
+            self.stages.push("dense patch", times.dense_patch);
+            self.stages.push("dense map", times.dense_map);
+            self.dense_patches += 1;
+        }
     }
 
-    /// Divides the processor time of a frame between tracking and mapping in the ratio of their wall times.
+    /// Divides the processor time of a frame between tracking, mapping and the dense map in the ratio of their wall times.
     fn count_processor_time(&mut self, cpu: Duration, wall: Duration, tracked: &Tracked) {
         let times = &tracked.times;
         let busy_s = wall.saturating_sub(times.detector_wait).as_secs_f64();
-        let mapping_s = if self.maps_inline { (times.mapping + times.places).as_secs_f64() } else { 0.0 };
-        let mapping = cpu.mul_f64((mapping_s / busy_s.max(1e-9)).clamp(0.0, 1.0));
+        let mapping_s = if self.maps_inline { (times.mapping + times.loops).as_secs_f64() } else { 0.0 };
+        let dense_s = (times.dense_patch + times.dense_map).as_secs_f64();
+        let [mapping, dense] = [mapping_s, dense_s].map(|s| cpu.mul_f64((s / busy_s.max(1e-9)).clamp(0.0, 1.0)));
         self.parts.add(Part::Mapping, mapping);
-        self.parts.add(Part::Tracking, cpu.saturating_sub(mapping));
+        self.parts.add(Part::Dense, dense);
+        self.parts.add(Part::Tracking, cpu.saturating_sub(mapping + dense));
     }
 
     fn update_best_start(&mut self) {
-        let features = &self.slam.last_frame().features.features;
+        let features = self.slam.features();
         let with_depth = features.iter().filter(|f| f.trust > 0.0 && f.depth_m.is_some()).count();
         self.best_start = self.best_start.max((features.len(), with_depth));
     }
@@ -194,13 +204,13 @@ impl Pipeline {
     /// # Errors
     /// It cannot be encoded, which would be a fault of this program.
     pub fn save_map(&mut self) -> Result<Vec<u8>> {
-        self.settle();
+        self.finish_mapping();
         Ok(self.slam.save_map()?)
     }
 
     /// Waits until mapping is finished.
-    pub fn settle(&mut self) {
-        if let (Some(closed), Some(last)) = (self.slam.settle(), self.live.last()) {
+    pub fn finish_mapping(&mut self) {
+        if let (Some(closed), Some(last)) = (self.slam.finish_mapping(), self.live.last()) {
             self.recognition.close(last.timestamp_ns, &closed);
         }
     }
@@ -210,13 +220,13 @@ impl Pipeline {
     /// # Errors
     /// No frame was tracked; the message says why.
     pub fn finish(mut self, config: &Config) -> Result<Outcome> {
-        self.settle();
-        self.recognition.keyframes_dropped = self.slam.passed_over();
+        self.finish_mapping();
+        self.recognition.keyframes_dropped = self.slam.statistics().keyframes_skipped;
         let submap_sizes: Vec<usize> = self.slam.trajectories().iter().map(Vec::len).collect();
         self.recognition.frames_in_other_submaps =
             submap_sizes.iter().sum::<usize>() - submap_sizes.iter().max().copied().unwrap_or(0);
         let wall = self.started.elapsed();
-        self.frames.detector_failures = self.slam.detector_failures();
+        self.frames.detector_failures = self.slam.statistics().detector_failures;
         if self.frames.tracked == 0 {
             self.fail(config)?;
         }
@@ -224,8 +234,7 @@ impl Pipeline {
         let new_keyframes = map.keyframes().filter(|(_, k)| k.sequence >= self.slam.first_keyframe());
         let mut keyframes: Vec<_> = new_keyframes.map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
         keyframes.sort_by_key(|&(sequence, ..)| sequence);
-        let landmark =
-            |l: &yfslam::map::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
+        let landmark = |l: &yfslam::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
         Ok(Outcome {
             trajectory: self.slam.trajectory().into_iter().map(stamped).collect(),
             live: self.live,

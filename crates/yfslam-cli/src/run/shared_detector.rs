@@ -6,8 +6,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use anyhow::Result;
-use yfslam::image::Image;
-use yfslam::{Config, Detection, Detector, RgbdFrame, SetupError, Upright, mask_of_classes};
+use yfslam::{Config, Detection, Detector, Frame, Image, RollCompensation, SetupError, mask_of_classes};
 
 use crate::input::detector::{DetectorTime, LoadedDetector};
 use crate::stats::process::{Part, Parts};
@@ -16,7 +15,7 @@ use crate::stats::stages::Stages;
 /// A detector that processes each frame once for several methods; once for each roll angle where the methods estimate different ones.
 pub struct SharedDetector {
     detector: Box<dyn Detector>,
-    upright: Upright,
+    upright: RollCompensation,
     times: Receiver<DetectorTime>,
     /// Indices of the classes that can move.
     movable: Vec<usize>,
@@ -61,7 +60,7 @@ impl SharedDetector {
         let movable = config.dynamic.movable.iter().map(index).collect::<Result<_, _>>()?;
         Ok(Self {
             detector,
-            upright: Upright::default(),
+            upright: RollCompensation::default(),
             times,
             movable,
             detections: None,
@@ -73,7 +72,7 @@ impl SharedDetector {
     }
 
     /// Starts the next frame.
-    pub fn begin(&mut self, frame: &RgbdFrame) {
+    pub fn begin(&mut self, frame: &Frame) {
         let refused = self.last_ns.is_some_and(|last_ns| last_ns >= frame.timestamp_ns);
         let due = !refused && self.frames.is_multiple_of(self.every);
         self.detections = due.then(Vec::new);
@@ -84,7 +83,7 @@ impl SharedDetector {
     }
 
     /// Returns the frame with its boxes for a method whose camera is rolled by `roll_deg`; without boxes if the detector skips it.
-    pub fn detect(&mut self, frame: &RgbdFrame, roll_deg: i32) -> RgbdFrame {
+    pub fn detect(&mut self, frame: &Frame, roll_deg: i32) -> Frame {
         let FrameDetections { boxes, mask } = match &self.detections {
             None => FrameDetections::default(),
             Some(known) => match known.iter().find(|(roll, _)| *roll == roll_deg) {
@@ -92,10 +91,13 @@ impl SharedDetector {
                 None => self.run_network(frame, roll_deg),
             },
         };
-        RgbdFrame { detections: Some(boxes), mask: frame.mask.clone().or(mask), ..frame.clone() }
+        let mut frame = frame.clone();
+        frame.detections = Some(boxes);
+        frame.mask = frame.mask.or(mask);
+        frame
     }
 
-    fn run_network(&mut self, frame: &RgbdFrame, roll_deg: i32) -> FrameDetections {
+    fn run_network(&mut self, frame: &Frame, roll_deg: i32) -> FrameDetections {
         let mut boxes = Vec::new();
         if let Err(error) = self.upright.detect(&mut *self.detector, &frame.color, roll_deg, &mut boxes) {
             tracing::warn!(timestamp_ns = frame.timestamp_ns, %error, "frame without boxes");

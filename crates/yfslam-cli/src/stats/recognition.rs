@@ -1,9 +1,7 @@
 //! Loop closing and relocalisation: loops that were closed, and how long the camera was lost.
 
 use serde::Serialize;
-use yfslam::Tracked;
-use yfslam::loops::LoopClosed;
-use yfslam::tracking::TrackingState;
+use yfslam::{LoopClosure, Tracked, TrackingState};
 
 /// Loops and losses of a run.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -50,17 +48,17 @@ impl RecognitionTally {
     /// Counts a frame.
     pub fn count(&mut self, tracked: &Tracked) {
         self.count_lost(tracked);
-        if let Some(closed) = &tracked.loop_closed {
+        if let Some(closed) = &tracked.loop_closure {
             self.close(tracked.timestamp_ns, closed);
         }
     }
 
     /// Counts a loop.
-    pub fn close(&mut self, timestamp_ns: i64, closed: &LoopClosed) {
+    pub fn close(&mut self, timestamp_ns: i64, closed: &LoopClosure) {
         let motion = closed.drift.isometry;
         let (drift_m, drift_deg) = (motion.translation.vector.norm(), motion.rotation.angle().to_degrees());
         let drift_scale = closed.drift.scaling();
-        let LoopClosed { inliers, merged_submaps, .. } = *closed;
+        let LoopClosure { inliers, merged_submaps, .. } = *closed;
         tracing::info!(inliers, drift_m, drift_deg, drift_scale, merged_submaps, "loop closed");
         self.loops.push(Loop { timestamp_ns, inliers, drift_m, drift_deg, drift_scale, merged_submaps });
     }

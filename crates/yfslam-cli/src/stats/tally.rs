@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use yfslam::Slam;
-use yfslam::tracking::TrackingState;
+use yfslam::{Slam, TrackingState};
 
 use crate::stats::skip::Skip;
 
@@ -79,10 +78,10 @@ pub struct DynamicTally {
 impl DynamicTally {
     /// Counts the last frame.
     pub fn count(&mut self, slam: &Slam) {
-        let features = &slam.last_frame().features.features;
+        let features = slam.features();
         self.features += features.len();
         self.dynamic_features += features.iter().filter(|f| f.trust <= 0.0).count();
         self.frames_with_motion += usize::from(!slam.moving_regions().is_empty());
-        self.boxes += slam.last_boxes().len();
+        self.boxes += slam.detections().len();
     }
 }

@@ -11,10 +11,10 @@ const NAMES: [(&str, Part); 8] = [
     ("yfslam-depth", Part::Reading),
     ("yfslam-right", Part::Reading),
     ("yfslam-render", Part::Reading),
-    ("right picture", Part::Tracking),
+    ("stereo", Part::Tracking),
     ("mapping", Part::Mapping),
-    ("adjusting", Part::Mapping),
-    ("yfslam-dense", Part::Dense),
+    ("global bundle", Part::Mapping),
+    ("dense map", Part::Dense),
 ];
 
 /// Frames between two searches for new threads.
@@ -121,7 +121,7 @@ mod tests {
                 done.wait();
                 go_on.wait();
             };
-            std::thread::Builder::new().name("yfslam-dense".into()).spawn_scoped(scope, work).unwrap();
+            std::thread::Builder::new().name("dense map".into()).spawn_scoped(scope, work).unwrap();
             done.wait();
             times.update();
             go_on.wait();

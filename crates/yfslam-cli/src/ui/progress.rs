@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use yfslam::tracking::TrackingState;
+use yfslam::TrackingState;
 
 use crate::stats::tally::FrameTally;
 use crate::ui::terminal::Terminal;

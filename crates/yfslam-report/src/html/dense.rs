@@ -4,7 +4,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 
-use crate::content::{DenseMap, MethodReport, Report};
+use crate::content::{DenseMapImages, MethodReport, Report};
 use crate::figures::ink::Ink;
 
 /// Returns the section; empty if no method has a dense map.
@@ -26,7 +26,7 @@ pub fn dense(report: &Report) -> Markup {
     }
 }
 
-fn view(method: &MethodReport, index: usize, map: &DenseMap, which: usize) -> Markup {
+fn view(method: &MethodReport, index: usize, map: &DenseMapImages, which: usize) -> Markup {
     let (png, [width, height]) = &map.views[which];
     let color = format!("color:var({})", Ink::method(method.name, index).variable());
     let from = ["from above", "from a corner"][which];

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 /// The dynamic filter: which features are kept out of tracking and mapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-#[non_exhaustive]
 pub enum Method {
     /// Every feature is used, as in ORB-SLAM2.
     None,

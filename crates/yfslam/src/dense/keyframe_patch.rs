@@ -44,7 +44,7 @@ impl CellGrid {
     }
 
     /// Cells per row.
-    pub(crate) fn columns(&self) -> usize {
+    pub fn columns(&self) -> usize {
         self.columns
     }
 
@@ -54,7 +54,7 @@ impl CellGrid {
     }
 
     /// Pixels along each side of a cell.
-    pub(crate) fn stride_px(&self) -> usize {
+    pub fn stride_px(&self) -> usize {
         self.stride_px
     }
 

@@ -197,7 +197,7 @@ impl Volume {
     }
 
     /// Where a patch hangs in the volume.
-    pub(crate) fn pose(&self, number: usize) -> Option<&Isometry3<f64>> {
+    pub fn pose(&self, number: usize) -> Option<&Isometry3<f64>> {
         Some(&self.patches.get(number)?.as_ref()?.t_map_cam)
     }
 

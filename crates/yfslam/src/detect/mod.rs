@@ -79,6 +79,20 @@ pub trait Detector: Send {
     }
 }
 
+impl<D: Detector + ?Sized> Detector for Box<D> {
+    fn class_names(&self) -> &[String] {
+        (**self).class_names()
+    }
+
+    fn detect(&mut self, image: &RgbImage, out: &mut Vec<Detection>) -> Result<(), DetectorError> {
+        (**self).detect(image, out)
+    }
+
+    fn mask(&self) -> Option<&Image<u8>> {
+        (**self).mask()
+    }
+}
+
 /// The pixels of a [`Detector::mask`] that show one of these classes; the others become 0.
 pub fn mask_of_classes(mask: &Image<u8>, classes: &[usize]) -> Image<u8> {
     let keeps: [bool; 256] = std::array::from_fn(|value| value > 0 && classes.contains(&(value - 1)));

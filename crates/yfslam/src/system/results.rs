@@ -91,6 +91,11 @@ impl Slam {
         &self.tracker.current.features.features
     }
 
+    /// Returns whether a feature of the last frame, by its index in [`Slam::features`], is matched to a landmark.
+    pub fn is_matched(&self, feature: usize) -> bool {
+        self.tracker.current.matches.get(feature).is_some_and(Option::is_some)
+    }
+
     /// Returns the detections of movable objects in the last frame, at any score.
     pub fn detections(&self) -> &[Detection] {
         &self.detections.movable

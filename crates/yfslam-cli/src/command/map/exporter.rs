@@ -5,13 +5,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use yfslam::dense::background::{Background, Backgrounds};
-use yfslam::dense::classes::Classes;
-use yfslam::dense::cloud::{CloudPoint, cloud};
-use yfslam::dense::grid::{GridCell, ground_grid};
-use yfslam::dense::mesh::mesh;
-use yfslam::dense::{KnownVoxel, Survey, Volume};
-use yfslam::image::{Image, RgbImage};
+use yfslam::dense::{
+    Background, Backgrounds, Classes, CloudPoint, DenseMap, GridCell, KnownVoxel, Volume, cloud, ground_grid, mesh,
+};
+use yfslam::{Image, RgbImage};
 use yfslam_io::write::{
     Labels, OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png, write_nav2,
     write_octomap, write_pcd, write_ply, write_ply_mesh,
@@ -34,7 +31,7 @@ const IMAGE_PX: [usize; 2] = [900, 600];
 
 /// Exports one volume.
 pub struct Exporter<'a> {
-    pub map: &'a Survey,
+    pub map: &'a DenseMap,
     pub volume: Volume,
     /// Classes of the voxels; `None` if the detector of the run had none.
     pub classes: Option<Classes>,
@@ -128,9 +125,9 @@ impl Exporter<'_> {
 
     /// Writes images of the keyframes with most people, without these people.
     pub fn background(&self) -> Result<String> {
-        let Survey { grid, pieces: patches, .. } = self.map;
+        let DenseMap { grid, patches, .. } = self.map;
         let cells = grid.rays().len();
-        let moving = |number: usize| (0..cells).filter(|cell| patches[number].piece.moves(*cell)).count();
+        let moving = |number: usize| (0..cells).filter(|cell| patches[number].patch.moves(*cell)).count();
         let mut most_hidden: Vec<(usize, usize)> = (0..patches.len()).map(|number| (moving(number), number)).collect();
         most_hidden.sort_by_key(|(moving, number)| (std::cmp::Reverse(*moving), *number));
         most_hidden.truncate(BACKGROUNDS);
@@ -139,10 +136,10 @@ impl Exporter<'_> {
         });
         let (mut filled, mut hidden) = (0, 0);
         for &(moving, number) in &most_hidden {
-            let patch = &patches[number].piece;
-            let Some(view) = views.of_piece(number) else { continue };
+            let patch = &patches[number].patch;
+            let Some(view) = views.of_patch(number) else { continue };
             let colors = (0..cells).map(|cell| patch.color(cell)).collect();
-            let original = RgbImage::from_vec(grid.columns(), grid.rows(), colors).unwrap_or_default();
+            let original = RgbImage::from_vec(view.color.width(), view.color.height(), colors).unwrap_or_default();
             write_view(&self.folder.join("background"), &format!("{number:06}"), &original, &view)?;
             hidden += moving;
             filled += view.valid.data().iter().filter(|valid| **valid).count() + moving - cells;
@@ -169,10 +166,10 @@ fn write_view(folder: &Path, name: &str, original: &RgbImage, view: &Background)
 pub fn with_progress<T>(
     terminal: Terminal,
     label: &str,
-    map: &Survey,
+    map: &DenseMap,
     work: impl FnOnce(&mut dyn FnMut(usize)) -> T,
 ) -> T {
-    let mut progress = Progress::new(terminal, label, map.pieces.len());
+    let mut progress = Progress::new(terminal, label, map.patches.len());
     let result = work(&mut |done| progress.at(done, "keyframes", String::new));
     progress.finish();
     result

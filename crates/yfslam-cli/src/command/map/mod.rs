@@ -10,9 +10,8 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use nalgebra::{UnitQuaternion, Vector3};
-use yfslam::dense::classes::classes;
-use yfslam::dense::persist::decode;
-use yfslam::dense::{DenseConfig, Survey, Volume, check_memory, cloud, mesh, up};
+use yfslam::dense::classes;
+use yfslam::dense::{DenseConfig, DenseMap, check_products};
 
 use self::exporter::{Exporter, with_progress};
 use self::options::{HeightBand, Up};
@@ -104,25 +103,19 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     terminal.note(&printer::memory_bound(&config, &map));
     let turn = args.turn(&map);
     let started = Instant::now();
-    let work = |report: &mut dyn FnMut(usize)| map.volume_within(&config, &turn, report);
+    let work = |report: &mut dyn FnMut(usize)| map.volume(&config, &turn, report);
     let (volume, cpu) = cpu::timed(|| with_progress(terminal, "occupancy", &map, work));
     let volume = volume?;
     let took = cpu.unwrap_or_else(|| started.elapsed());
-    let mut text = printer::occupancy(&volume, took.as_secs_f64() * 1e3 / map.pieces.len() as f64);
-    let floor_m = args.floor.or(up::floor_m(&map, &turn).map(|floor| floor as f32)).unwrap_or_default();
+    let mut text = printer::occupancy(&volume, took.as_secs_f64() * 1e3 / map.patches.len() as f64);
+    let floor_m = args.floor.or(map.floor_m(&turn).map(|floor| floor as f32)).unwrap_or_default();
     let work = |report: &mut dyn FnMut(usize)| classes(&map, &volume, report);
     let classes = (!map.class_names.is_empty()).then(|| with_progress(terminal, "classes", &map, work));
     text += &printer::floor(&map, &turn, floor_m);
     let exporter = Exporter { map: &map, volume, classes, floor_m, folder, terminal };
     let all = !(args.cloud || args.octomap || args.grid || args.mesh || args.background);
     // Nothing is written if a product would take too much memory.
-    for (wanted, product, bytes) in
-        [(args.cloud, "the cloud", cloud::bytes as fn(&Volume) -> usize), (args.mesh, "the mesh", mesh::bytes)]
-    {
-        if wanted || all {
-            check_memory(&config, product, bytes(&exporter.volume))?;
-        }
-    }
+    check_products(&exporter.volume, args.cloud || all, args.mesh || all)?;
     text += &exporter.legend()?;
     if args.cloud || all {
         text += &exporter.cloud()?;
@@ -154,22 +147,22 @@ impl DenseMapArgs {
     }
 
     /// Returns the dense map, and the folder for its products.
-    fn open(&self) -> Result<(Survey, PathBuf)> {
+    fn open(&self) -> Result<(DenseMap, PathBuf)> {
         let file = if self.run.is_dir() { self.run.join(DENSE_FILE) } else { self.run.clone() };
         let bytes = std::fs::read(&file).with_context(|| {
             format!("cannot read {}; make it with `yfslam run SEQUENCE --dense`, or check the path", file.display())
         })?;
-        let map = decode(&bytes).with_context(|| format!("{} cannot be used", file.display()))?;
-        ensure!(!map.pieces.is_empty(), "{} holds no keyframe: the run tracked nothing", file.display());
+        let map = DenseMap::from_bytes(&bytes).with_context(|| format!("{} cannot be used", file.display()))?;
+        ensure!(!map.patches.is_empty(), "{} holds no keyframe: the run tracked nothing", file.display());
         let beside = || file.parent().unwrap_or(Path::new(".")).join("map");
         Ok((map, self.out.clone().unwrap_or_else(beside)))
     }
 
-    fn turn(&self, map: &Survey) -> UnitQuaternion<f64> {
-        match self.up {
-            Up::Level => up::of_survey(map),
-            Up::Camera => up::of_camera(),
-            Up::Direction(up) => up::from_up(&Vector3::from(up)),
-        }
+    fn turn(&self, map: &DenseMap) -> UnitQuaternion<f64> {
+        map.turn(match self.up {
+            Up::Level => yfslam::dense::Up::Level,
+            Up::Camera => yfslam::dense::Up::Camera,
+            Up::Direction(up) => yfslam::dense::Up::Direction(Vector3::from(up)),
+        })
     }
 }

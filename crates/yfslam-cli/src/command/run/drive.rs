@@ -1,8 +1,7 @@
 //! Takes the frames of a source through one or more methods.
 
 use anyhow::{Result, bail};
-use yfslam::dynamic::Method;
-use yfslam::{Config, RgbdFrame};
+use yfslam::{Config, Frame, Method};
 
 use crate::input::detector::LoadedDetector;
 use crate::input::settings::describe;
@@ -70,7 +69,7 @@ impl Setup<'_> {
 
 impl RecordedRun {
     /// Processes one frame, unless an earlier one failed.
-    fn process(&mut self, frame: &Result<RgbdFrame, Skip>) {
+    fn process(&mut self, frame: &Result<Frame, Skip>) {
         if self.failure.is_some() {
             return;
         }
@@ -127,10 +126,10 @@ pub fn drive(
 
 /// Returns the frame for each run, with boxes from the shared detector, if there is one.
 fn distribute(
-    frame: Result<RgbdFrame, Skip>,
+    frame: Result<Frame, Skip>,
     detector: Option<&mut SharedDetector>,
     runs: &[RecordedRun],
-) -> Vec<Result<RgbdFrame, Skip>> {
+) -> Vec<Result<Frame, Skip>> {
     let (Some(detector), Ok(frame)) = (detector, &frame) else { return vec![frame; runs.len()] };
     detector.begin(frame);
     let frame_for = |RecordedRun { run, .. }: &RecordedRun| {

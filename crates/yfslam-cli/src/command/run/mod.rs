@@ -7,9 +7,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Command, FromArgMatches};
-use yfslam::Config;
 use yfslam::config::DepthSource;
-use yfslam::dynamic::Method;
+use yfslam::{Config, Method};
 use yfslam_report::{TableStyle, evaluation_table};
 
 use self::drive::{RecordedResult, Setup, drive, finish};

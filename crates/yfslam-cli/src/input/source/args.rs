@@ -124,11 +124,11 @@ impl SourceArgs {
         if self.masks.is_some() {
             bail!("masks belong to the images of a folder; write the world with `yfslam synth` to run it with --masks");
         }
-        let camera = match &self.camera {
-            Some(spec) => load_camera(spec, None)?.camera,
-            None => default_camera(),
+        let (camera, depth_factor) = match &self.camera {
+            Some(spec) => load_camera(spec, None).map(|source| (source.camera, source.depth_factor))?,
+            None => (default_camera(), WorldConfig::default().depth_factor),
         };
-        Ok(parse_with_camera(&self.sequence, camera)?)
+        Ok(parse_with_camera(&self.sequence, camera, depth_factor)?)
     }
 
     /// Returns whether boxes come with the sequence: from a synthetic world, or from a `boxes.json`.

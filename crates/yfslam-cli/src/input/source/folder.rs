@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Result, ensure};
 use yfslam::config::DepthSource;
-use yfslam::{Camera, Detection, RgbdFrame};
+use yfslam::{Detection, Frame};
 use yfslam_io::boxes::KnownDetections;
 use yfslam_io::camera::check_camera;
 use yfslam_io::decode::DecodeError;
@@ -32,14 +32,14 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     if !camera.unused_keys.is_empty() {
         tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "keys of the camera file that are not used");
     }
-    check(&sequence, &camera.camera)?;
+    check(&sequence, &camera)?;
     let boxes = match own_boxes {
         Some(classes) => Some(BoxList::read(&args.boxes_file())?.detections(classes)),
         None => None,
     };
     let masks = args.masks.as_deref().map(|folder| Masks::open(folder, &sequence, &camera.camera)).transpose()?;
     let tally = masks.as_ref().map(|masks| masks.tally.clone());
-    let stream = FrameStream::open(&sequence, &camera.camera, DEFAULT_LOOK_AHEAD)?;
+    let stream = FrameStream::open(&sequence, &camera, DEFAULT_LOOK_AHEAD)?;
     let extras = FolderExtras { boxes, mirror: sequence.mirror, masks };
     let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();
     Ok(Source {
@@ -57,7 +57,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
 
 /// Checks camera and depth factor against the first frames or, if those are unusable, against frames of the whole sequence: some sensors
 /// deliver unusable frames at the start.
-fn check(sequence: &Sequence, camera: &Camera) -> Result<()> {
+fn check(sequence: &Sequence, camera: &CameraSource) -> Result<()> {
     let Err(error) = check_recording(sequence, camera) else { return Ok(()) };
     let step = sequence.entries.len().div_ceil(PROBES).max(1);
     let entries = sequence.entries.iter().step_by(step).cloned().collect();
@@ -101,9 +101,9 @@ fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
         (None, None) => detect_camera(args.folder())?,
     };
     if let Some(factor) = args.depth_factor {
-        source.camera.depth_factor = factor;
+        source.depth_factor = factor;
         source.origin += &format!(" with --depth-factor {factor}");
-        check_camera(&source.camera, &source.origin)?;
+        check_camera(&source)?;
     }
     Ok(source)
 }
@@ -115,7 +115,7 @@ fn name(args: &SourceArgs) -> String {
 }
 
 /// Returns the next frame with its boxes and its mask.
-pub fn next(stream: &mut FrameStream, extras: &FolderExtras, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
+pub fn next(stream: &mut FrameStream, extras: &FolderExtras, stages: &mut Stages) -> Option<Result<Frame, Skip>> {
     let before = stream.times();
     let frame = stream.next()?;
     let after = stream.times();
@@ -133,7 +133,7 @@ pub fn next(stream: &mut FrameStream, extras: &FolderExtras, stages: &mut Stages
 
 impl FolderExtras {
     /// Adds boxes and mask to the frame.
-    fn add_to(&self, frame: RgbdFrame, stages: &mut Stages) -> Result<RgbdFrame, Skip> {
+    fn add_to(&self, mut frame: Frame, stages: &mut Stages) -> Result<Frame, Skip> {
         let detections = self.boxes.as_ref().map(|boxes| self.boxes_at(boxes, frame.timestamp_ns));
         let started = Instant::now();
         let mask = match &self.masks {
@@ -143,7 +143,8 @@ impl FolderExtras {
         if self.masks.is_some() {
             stages.push("decode mask", started.elapsed());
         }
-        Ok(RgbdFrame { detections, mask, ..frame })
+        (frame.detections, frame.mask) = (detections, mask);
+        Ok(frame)
     }
 
     /// Returns the boxes of the frame that is played at this time; none if the file does not list it.

@@ -1,7 +1,7 @@
 //! Frames of a sequence in order, with injected faults.
 
-use yfslam::RgbdFrame;
 use yfslam::config::DepthSource;
+use yfslam::{DepthImage, Frame};
 use yfslam_io::boxes::KnownDetections;
 use yfslam_io::time::{TimeMirror, format_stamp};
 use yfslam_io::{Delivery, FaultInjector, FrameStream};
@@ -42,7 +42,7 @@ impl Frames {
     }
 
     /// Returns the next frame, or why it cannot be used; `None` at the end. Adds the durations of reading to `stages`.
-    pub fn next(&mut self, stages: &mut Stages) -> Option<Result<RgbdFrame, Skip>> {
+    pub fn next(&mut self, stages: &mut Stages) -> Option<Result<Frame, Skip>> {
         loop {
             if let Some(delivery) = self.faults.pop() {
                 return Some(usable(delivery, self.depth_source));
@@ -64,14 +64,15 @@ impl Frames {
 }
 
 /// Refuses a frame without a time stamp, or with a depth image without any measurement.
-fn usable(Delivery { frame, has_stamp }: Delivery, depth_source: DepthSource) -> Result<RgbdFrame, Skip> {
+fn usable(Delivery { frame, has_stamp }: Delivery, depth_source: DepthSource) -> Result<Frame, Skip> {
     let skip = |reason, problem: &str| {
         Err(Skip { reason, message: format!("the frame at t = {} {problem}", format_stamp(frame.timestamp_ns)) })
     };
     if !has_stamp {
         return skip("no time stamp", "came with a time stamp that is not a number");
     }
-    if depth_source == DepthSource::Image && frame.depth.raw.data().iter().all(|&raw| raw == 0) {
+    let is_empty = |depth: &DepthImage| depth.raw.data().iter().all(|&raw| raw == 0);
+    if depth_source == DepthSource::Image && frame.depth.as_deref().is_none_or(is_empty) {
         return skip("no depth in any pixel", "has no depth in any pixel");
     }
     Ok(frame)

@@ -9,8 +9,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
-use yfslam::Camera;
-use yfslam::image::Image;
+use yfslam::{Camera, Image};
 use yfslam_io::Sequence;
 use yfslam_io::decode::{ImageSize, decode_mask};
 use yfslam_io::sequence::lists::parse_file_list;

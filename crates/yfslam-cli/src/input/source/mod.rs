@@ -13,7 +13,7 @@ use std::path::Path;
 use anyhow::Result;
 use yfslam::config::DepthSource;
 use yfslam_eval::StampedPose;
-use yfslam_io::sequence::{AssociationReport, TruthReader};
+use yfslam_io::sequence::{AssociationReport, GroundTruthReader};
 use yfslam_io::time::TimeMirror;
 use yfslam_io::trajectory::mirror_trajectory;
 use yfslam_io::{CameraSource, TrajectoryFile};
@@ -43,7 +43,7 @@ pub struct Source {
     /// Which frames have a mask; `None` without `--masks`.
     pub masks: Option<MaskTally>,
     /// Reads ground truth in the format of the folder; `None` for synthetic worlds.
-    pub truth_reader: Option<TruthReader>,
+    pub truth_reader: Option<GroundTruthReader>,
     /// Mirrors time stamps if the sequence is played in reverse.
     pub mirror: Option<TimeMirror>,
 }
@@ -87,7 +87,7 @@ impl Source {
         let path = match (file, self.truth_of_world()) {
             (None, Some(truth)) => return Ok(Some(truth)),
             (Some(file), _) => file,
-            (None, None) => match reader.and_then(TruthReader::path) {
+            (None, None) => match reader.and_then(GroundTruthReader::path) {
                 Some(path) => path,
                 None => return Ok(None),
             },

@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use yfslam::RgbdFrame;
+use yfslam::Frame;
 use yfslam::config::DepthSource;
 use yfslam_eval::StampedPose;
 use yfslam_io::CameraSource;
@@ -27,7 +27,7 @@ pub struct Renderer {
     world: Arc<World>,
     part: Part,
     /// `None` only while dropping.
-    frames: Option<Receiver<(RgbdFrame, Duration)>>,
+    frames: Option<Receiver<(Frame, Duration)>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -84,7 +84,12 @@ fn name_render_threads() {
 
 /// Returns the camera of a world.
 pub fn world_camera(config: &WorldConfig) -> CameraSource {
-    CameraSource { camera: config.camera.clone(), origin: "synthetic world".into(), unused_keys: Vec::new() }
+    CameraSource {
+        camera: config.camera.clone(),
+        depth_factor: config.depth_factor,
+        origin: "synthetic world".into(),
+        unused_keys: Vec::new(),
+    }
 }
 
 impl Part {
@@ -126,7 +131,7 @@ impl Renderer {
     }
 
     /// Waits for the next frame.
-    pub fn next(&mut self, stages: &mut Stages) -> Option<RgbdFrame> {
+    pub fn next(&mut self, stages: &mut Stages) -> Option<Frame> {
         let requested = Instant::now();
         let (frame, took) = self.frames.as_ref()?.recv().ok()?;
         stages.push("render", took);
