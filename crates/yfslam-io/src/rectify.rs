@@ -165,7 +165,7 @@ impl Remap {
 
 /// Two neighbours.
 fn pair(data: &[[u8; 3]], first: usize) -> Option<&[[u8; 3]; 2]> {
-    data.get(first..first + 2)?.as_array()
+    data.get(first..)?.first_chunk()
 }
 
 #[cfg(test)]
