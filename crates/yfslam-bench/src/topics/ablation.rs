@@ -74,6 +74,9 @@ fn run(
     options.extend(["--config".to_owned(), runs::text(&file)?]);
     let (command, mut done) = runs::methods(setup, sequence, &["full"], &options)?;
     let done = done.pop().context("no run")?;
+    if let Err(failure) = &done.result {
+        anyhow::bail!("{command} with {settings:?}: {failure}");
+    }
     let command = format!("{command}  (part.toml: {})", settings.trim().replace('\n', "; "));
     Ok((command, move |row| runs::row(row, &done, runs::accuracy)))
 }
@@ -97,4 +100,17 @@ fn page(records: &[&Record]) -> Result<String> {
          one run of each recording (boxes from the embedded network). Behind it, where there are any, the frames that were not tracked. \
          Differences of a few per cent are within the spread between seeds or starts.\n\n{table}"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_part_is_left_out_by_settings_that_exist() {
+        for (part, settings) in PARTS {
+            let config = yfslam::Config::from_toml(settings);
+            assert!(config.is_ok(), "{part}: {:?}", config.err());
+        }
+    }
 }
