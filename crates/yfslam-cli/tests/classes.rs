@@ -8,21 +8,16 @@
 )]
 
 mod common;
-#[path = "../examples/dense/judge.rs"]
-mod judge;
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::sync::{Arc, Mutex};
 
 use common::succeeds;
-use judge::{index_of, t_survey_world};
 use nalgebra::{Isometry3, Point3};
-use yfslam::dense::classes;
-use yfslam::dense::persist::encode;
-use yfslam::dense::{Voxel, voxel_at};
-use yfslam::dense::{DenseConfig, DenseMapper, DenseMap, Volume, up};
-use yfslam::{Config, Detection, Detector, DetectorError, Execution, RgbImage, Slam};
+use yfslam::dense::{DenseConfig, DenseMap, Up, Volume, Voxel, classes, voxel_at};
+use yfslam::{Detection, Detector, DetectorError, RgbImage, Slam};
+use yfslam_bench::dense::ghost_metrics::{index_of, t_map_world};
 use yfslam_synth::{CLASS_NAMES, World, parse};
 
 /// Class of the static box, as an index into [`CLASS_NAMES`].
@@ -45,38 +40,27 @@ impl Detector for Oracle {
     }
 }
 
-/// Returns the map of a world with exact detections.
-fn survey_of(world: &World) -> DenseMap {
+/// Returns the dense map of a world with exact detections.
+fn map_of(world: &World) -> DenseMap {
     let boxes = Arc::new(Mutex::new(Vec::new()));
     let oracle = Oracle { names: CLASS_NAMES.map(str::to_owned).to_vec(), boxes: boxes.clone() };
-    let camera = &world.config().camera;
-    let mut slam = Slam::new(Config::default(), camera, Some(Box::new(oracle))).unwrap();
-    let mut mapper = DenseMapper::new(&DenseConfig::default(), camera, Execution::Inline).unwrap();
-    let ids = mapper.name_classes(slam.class_names());
+    let builder = Slam::builder(world.config().camera.clone()).detector(oracle);
+    let mut slam = builder.dense(DenseConfig::default()).build().unwrap();
     for index in 0..world.len() {
         let shot = world.frame(index);
         let exact = |&(_, class, bbox): &(u8, usize, _)| Detection { class, score: 0.9, bbox };
         *boxes.lock().unwrap() = shot.boxes.iter().map(exact).collect();
-        let frame = &shot.frame;
-        let tracked = slam.track(frame).unwrap();
-        let Some(tie) = slam.last_frame().reference.filter(|_| tracked.is_keyframe) else { continue };
-        if mapper.is_due(frame.timestamp_ns, &slam.last_frame().t_cam_world.inverse()) {
-            let moving = slam.moving_mask(&frame.depth);
-            let piece = mapper.cut(&frame.color, &frame.depth, |at, edge| moving.covers(&frame.depth, at, edge));
-            let things = slam.things(&frame.depth, &moving).unwrap();
-            let class = |at| things.class_at(at).map_or(0, |class| ids[class]);
-            mapper.hang(frame.timestamp_ns, tie, piece.with_classes(&mapper.grid().clone(), class), slam.map());
-        }
+        slam.track(&shot.frame).unwrap();
     }
-    mapper.into_survey(slam.map())
+    slam.dense().unwrap().snapshot()
 }
 
 /// Returns the voxels with the exact surface of the box that the patches observe.
-fn true_voxels(survey: &DenseMap, volume: &Volume, world: &World) -> BTreeSet<Voxel> {
+fn true_voxels(map: &DenseMap, volume: &Volume, world: &World) -> BTreeSet<Voxel> {
     let camera = &world.config().camera;
-    let turn = volume.pose(0).unwrap() * survey.pieces[0].t_world_cam.inverse() * t_survey_world(survey, world);
+    let turn = volume.pose(0).unwrap() * map.patches[0].t_world_cam.inverse() * t_map_world(map, world);
     let mut voxels = BTreeSet::new();
-    for one in &survey.pieces {
+    for one in &map.patches {
         let shot = world.frame(index_of(world, one.timestamp_ns));
         let pose: Isometry3<f32> = (turn * shot.t_world_cam).cast();
         let Some((instance, ..)) = shot.boxes.iter().find(|(_, class, _)| *class == BOX) else { continue };
@@ -92,9 +76,9 @@ fn true_voxels(survey: &DenseMap, volume: &Volume, world: &World) -> BTreeSet<Vo
 }
 
 /// Returns the number of voxels of the box, of those with its class, of other voxels with its class, and of those with another class.
-fn count_named(survey: &DenseMap, world: &World) -> [usize; 4] {
-    let volume = survey.volume(&DenseConfig::default(), &up::of_survey(survey), |_| {});
-    let (truth, found) = (true_voxels(survey, &volume, world), classes(survey, &volume, |_| {}));
+fn count_named(map: &DenseMap, world: &World) -> [usize; 4] {
+    let volume = map.volume(&DenseConfig::default(), &map.turn(Up::Level), |_| {}).unwrap();
+    let (truth, found) = (true_voxels(map, &volume, world), classes(map, &volume, |_| {}));
     let near = |[x, y, z]: Voxel| (0..27).any(|i| truth.contains(&[x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]));
     let mut counts = [0; 4];
     for voxel in volume.voxels().filter(|known| known.occupied).map(|known| known.voxel) {
@@ -110,18 +94,18 @@ fn count_named(survey: &DenseMap, world: &World) -> [usize; 4] {
 fn a_box_among_walking_people_has_its_class_also_if_it_is_not_detected_in_half_of_the_frames() {
     let config = parse("synth:walking_xyz?moved=on&width=320&height=240&frames=150&seed=4").unwrap();
     let world = World::new(&config).unwrap();
-    let mut survey = survey_of(&world);
-    assert_eq!(survey.class_names, CLASS_NAMES);
-    let [occupied, named, beyond, others] = count_named(&survey, &world);
+    let mut map = map_of(&world);
+    assert_eq!(map.class_names, CLASS_NAMES);
+    let [occupied, named, beyond, others] = count_named(&map, &world);
     println!("{named} of {occupied} voxels named, {beyond} beyond, {others} with another name");
     assert!(occupied > 100 && named * 100 >= occupied * 95 && beyond * 20 <= occupied && others == 0);
 
-    products_have_classes(&survey);
+    products_have_classes(&map);
 
-    for one in survey.pieces.iter_mut().skip(1).step_by(2) {
-        one.piece = one.piece.clone().with_classes(&survey.grid, |_| 0);
+    for one in map.patches.iter_mut().skip(1).step_by(2) {
+        one.patch = one.patch.clone().with_classes(&map.grid, |_| 0);
     }
-    let [occupied, named, beyond, others] = count_named(&survey, &world);
+    let [occupied, named, beyond, others] = count_named(&map, &world);
     println!(
         "missed in half of the views: {named} of {occupied} voxels named, {beyond} beyond, {others} with another name"
     );
@@ -129,9 +113,9 @@ fn a_box_among_walking_people_has_its_class_also_if_it_is_not_detected_in_half_o
 }
 
 /// `yfslam map` writes classes to all products that can hold them, and prints their counts.
-fn products_have_classes(survey: &DenseMap) {
+fn products_have_classes(map: &DenseMap) {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("dense.map"), encode(survey).unwrap()).unwrap();
+    fs::write(folder.path().join("dense.map"), map.to_bytes().unwrap()).unwrap();
     let printed = succeeds(folder.path(), &["map", "dense.map", "--cloud", "--octomap", "--out", "out"]).stdout;
     assert!(printed.contains("classes, in voxels: box 1"), "{printed}");
     let read = |name: &str| fs::read(folder.path().join("out").join(name)).unwrap();

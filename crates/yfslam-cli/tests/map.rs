@@ -3,26 +3,18 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
 mod common;
-#[path = "../examples/dense/judge.rs"]
-mod judge;
-#[path = "../examples/dense/survey.rs"]
-mod survey;
-#[path = "../examples/dense/thickness.rs"]
-mod thickness;
-#[path = "../examples/dense/view.rs"]
-mod view;
 
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
 use common::{fails, succeeds};
-use judge::{Occupancy, Truth, survey_of_exact_poses};
-use survey::{Taken, Way, take};
-use thickness::thickness;
-use yfslam::dense::persist::decode;
-use yfslam::dense::{DenseConfig, DenseMap, PlacedPatch, Volume, up};
 use yfslam::Method;
+use yfslam::dense::{DenseConfig, DenseMap, PlacedPatch, Up, Volume};
+use yfslam_bench::dense::background_metrics;
+use yfslam_bench::dense::dense_run::{DenseRun, RunOptions, run_all};
+use yfslam_bench::dense::ghost_metrics::{ExactSurfaces, Occupancy, with_exact_poses};
+use yfslam_bench::dense::wall_thickness::wall_thickness;
 use yfslam_synth::{World, parse};
 
 /// Two people walk through the image.
@@ -144,21 +136,21 @@ fn the_map_of_two_sessions_shows_what_both_have_observed() {
     );
     succeeds(folder.path(), &[&again[..], &["--dense", "--save-map", "both.map", "--out", "second"]].concat());
     let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
-    let survey = |name: &str| decode(&read(name)).unwrap();
-    let (before, both) = (survey("first.map"), survey("both.map"));
-    assert_eq!(survey("second/dense.map"), both);
-    let earlier = before.pieces.len();
-    let pieces = |survey: &DenseMap| survey.pieces.iter().map(|one| one.piece.clone()).collect::<Vec<_>>();
-    assert!(earlier >= 8 && both.pieces.len() >= earlier + 6, "{earlier} of {} pieces", both.pieces.len());
-    assert_eq!(pieces(&both)[..earlier], pieces(&before));
+    let dense_map = |name: &str| DenseMap::from_bytes(&read(name)).unwrap();
+    let (before, both) = (dense_map("first.map"), dense_map("both.map"));
+    assert_eq!(dense_map("second/dense.map"), both);
+    let earlier = before.patches.len();
+    let patches = |map: &DenseMap| map.patches.iter().map(|one| one.patch.clone()).collect::<Vec<_>>();
+    assert!(earlier >= 8 && both.patches.len() >= earlier + 6, "{earlier} of {} patches", both.patches.len());
+    assert_eq!(patches(&both)[..earlier], patches(&before));
     // The patches of each session, where the map of both has them.
-    let part = |pieces: &[PlacedPatch]| DenseMap { pieces: pieces.to_vec(), ..both.clone() };
-    let occupied = |survey: &DenseMap| {
-        let volume = survey.volume(&DenseConfig::default(), &up::of_camera(), |_| {});
+    let part = |patches: &[PlacedPatch]| DenseMap { patches: patches.to_vec(), ..both.clone() };
+    let occupied = |map: &DenseMap| {
+        let volume = map.volume(&DenseConfig::default(), &map.turn(Up::Camera), |_| {}).unwrap();
         let voxels = volume.voxels().filter(|known| known.occupied).map(|known| known.voxel);
         (voxels.collect::<Vec<_>>(), volume)
     };
-    let parts = [occupied(&part(&both.pieces[..earlier])).0, occupied(&part(&both.pieces[earlier..])).0];
+    let parts = [occupied(&part(&both.patches[..earlier])).0, occupied(&part(&both.patches[earlier..])).0];
     let (voxels, volume) = occupied(&both);
     for part in parts {
         let kept = part.iter().filter(|voxel| volume.is_occupied(**voxel)).count() as f64 / part.len() as f64;
@@ -170,7 +162,7 @@ fn the_map_of_two_sessions_shows_what_both_have_observed() {
     assert!(number(&printed, "cloud: ") * 10 > voxels.len() * 9, "{printed}");
     // Localisation changes nothing.
     succeeds(folder.path(), &[&again[..], &["--localise", "--out", "third"]].concat());
-    assert_eq!(decode(&read("first.map")).unwrap(), before);
+    assert_eq!(dense_map("first.map"), before);
 }
 
 fn world(spec: &str) -> World {
@@ -181,37 +173,37 @@ fn world(spec: &str) -> World {
 
 fn mapped(world: &World, method: Method) -> (DenseMap, Volume) {
     let config = DenseConfig::default();
-    let taken = take(world, &[Way { method, loops: true }], &config).unwrap().remove(0);
-    let Taken { survey, each_ms, bytes } = taken;
-    println!("{method:?}: {} pieces, {each_ms:.1} ms each", survey.pieces.len());
+    let run = run_all(world, &[RunOptions { method, loops: true }], &config).unwrap().remove(0);
+    let DenseRun { map, ms_per_keyframe, bytes } = run;
+    println!("{method:?}: {} patches, {ms_per_keyframe:.1} ms each", map.patches.len());
     assert!(bytes < 20_000_000, "{bytes} bytes");
-    let volume = survey.volume(&config, &up::of_survey(&survey), |_| {});
-    (survey, volume)
+    let volume = map.volume(&config, &map.turn(Up::Level), |_| {}).unwrap();
+    (map, volume)
 }
 
 #[test]
 fn walking_people_leave_no_ghosts_and_walls_are_where_they_should_be() {
     let world = world("synth:walking_xyz?width=320&height=240&frames=150");
     let of = |method| {
-        let (survey, volume) = mapped(&world, method);
-        let found = Truth::of(&survey, &volume, &world).judge(&volume);
+        let (map, volume) = mapped(&world, method);
+        let found = ExactSurfaces::of(&map, &volume, &world).compare(&volume);
         println!("{found:?}");
-        (survey, volume, found)
+        (map, volume, found)
     };
     let (.., none) = of(Method::None);
     assert!(none.ghosts > 0.005, "without a filter there are ghosts: {none:?}");
-    for method in [Method::Yf, Method::Full] {
-        let (survey, volume, found) = of(method);
+    for method in [Method::YfSlam, Method::Full] {
+        let (map, volume, found) = of(method);
         let Occupancy { precision, recall, ghosts, occupied } = found;
         assert!(precision >= 0.95 && recall >= 0.90 && ghosts <= 0.001, "{method:?}: {found:?}");
-        let exact = survey_of_exact_poses(&survey, &world);
-        let exact = exact.volume(volume.config(), &up::of_survey(&exact), |_| {});
+        let exact = with_exact_poses(&map, &world);
+        let exact = exact.volume(volume.config(), &exact.turn(Up::Level), |_| {}).unwrap();
         let exact = exact.voxels().filter(|known| known.occupied).count();
         assert!((occupied as f64 / exact as f64 - 1.0).abs() < 0.1, "as thin as with exact poses: {occupied}, {exact}");
-        let views = view::judge(&survey, &volume, &world).unwrap();
+        let views = background_metrics::compare(&map, &volume, &world).unwrap();
         println!("{views:?}");
         assert!(views.psnr_db >= 25.0 && views.valid >= 0.9, "{method:?}: {views:?}");
-        assert!(views.filled_psnr_db >= 25.0 && views.filled >= 0.85 * views.shown, "{method:?}: {views:?}");
+        assert!(views.filled_psnr_db >= 25.0 && views.filled >= 0.85 * views.fillable, "{method:?}: {views:?}");
     }
 }
 
@@ -219,11 +211,11 @@ fn walking_people_leave_no_ghosts_and_walls_are_where_they_should_be() {
 fn after_a_loop_walls_observed_twice_are_as_thin_as_without_drift() {
     let world = world("synth:corridor_loop?people=0&frames=440&fps=10&width=320&height=240");
     let config = DenseConfig::default();
-    let way = |loops| Way { method: Method::None, loops };
-    let taken = take(&world, &[way(true), way(false)], &config).unwrap();
-    let of = |survey: &DenseMap| thickness(survey, &world, &config);
-    let (closed, open) = (of(&taken[0].survey), of(&taken[1].survey));
-    let exact = of(&survey_of_exact_poses(&taken[0].survey, &world));
+    let options = |loops| RunOptions { method: Method::None, loops };
+    let runs = run_all(&world, &[options(true), options(false)], &config).unwrap();
+    let of = |map: &DenseMap| wall_thickness(map, &world, &config).unwrap();
+    let (closed, open) = (of(&runs[0].map), of(&runs[1].map));
+    let exact = of(&with_exact_poses(&runs[0].map, &world));
     println!("exact poses {exact:?}\nloop closed {closed:?}\nno loops    {open:?}");
     assert!(exact.patches > 1000 && open.patches > 1000);
     // A tenth of a voxel.

@@ -76,17 +76,8 @@ fn every_method_with_boxes_or_segmentation_drops_people() {
 
 /// The cameras of EuRoC at half their size with their poses relative to the left one, turned by some degrees as real cameras are.
 fn euroc_cameras() -> [(Camera, Isometry3<f64>); 2] {
-    let camera = |f: f64, cx: f64, cy: f64, k1: f64, k2: f64| Camera {
-        width: 376,
-        height: 240,
-        fx: f,
-        fy: f - 0.7,
-        cx,
-        cy,
-        distortion: [k1, k2, 2e-4, 2e-5, 0.0],
-        depth_factor: 5000.0,
-        fps: 20.0,
-        bf: 40.0,
+    let camera = |f: f64, cx: f64, cy: f64, k1: f64, k2: f64| {
+        Camera::pinhole(376, 240, f, f - 0.7, cx, cy).with_distortion([k1, k2, 2e-4, 2e-5, 0.0]).with_fps(20.0)
     };
     let turn = UnitQuaternion::from_euler_angles(0.014, -0.02, 0.012);
     let mount = Isometry3::from_parts(Translation3::new(0.11, 0.0004, -0.0008), turn);

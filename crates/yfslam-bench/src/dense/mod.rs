@@ -1,9 +1,9 @@
 //! Dense maps of rendered worlds against the exact world, for several methods.
 
-mod background_metrics;
-mod dense_run;
-mod ghost_metrics;
-mod wall_thickness;
+pub mod background_metrics;
+pub mod dense_run;
+pub mod ghost_metrics;
+pub mod wall_thickness;
 
 use anyhow::Result;
 use clap::Args;

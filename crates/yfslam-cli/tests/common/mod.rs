@@ -86,7 +86,7 @@ fn render() -> TempDir {
         let shot = world.frame(index);
         let stamp = format_stamp(shot.frame.timestamp_ns);
         write_color_png(&folder.join(format!("rgb/{index}.png")), &shot.frame.color).unwrap();
-        write_depth_png(&folder.join(format!("depth/{index}.png")), &shot.frame.depth.raw).unwrap();
+        write_depth_png(&folder.join(format!("depth/{index}.png")), &shot.frame.depth.as_ref().unwrap().raw).unwrap();
         writeln!(rgb, "{stamp} rgb/{index}.png").unwrap();
         writeln!(depth, "{stamp} depth/{index}.png").unwrap();
         let (t, q) = (shot.t_world_cam.translation, shot.t_world_cam.rotation);

@@ -143,7 +143,7 @@ impl KeyframePatch {
     }
 
     /// The patch with classes: `class(position)` is that of what a position of the image, px, shows; 0 where that is unknown.
-    pub(crate) fn with_classes(mut self, grid: &CellGrid, class: impl Fn([f32; 2]) -> u8) -> Self {
+    pub fn with_classes(mut self, grid: &CellGrid, class: impl Fn([f32; 2]) -> u8) -> Self {
         let of_cell = |cell| self.surface_m(cell).map_or(0, |_| class(grid.middle_px(cell)));
         self.class = (0..self.depth.len()).map(of_cell).collect();
         self
