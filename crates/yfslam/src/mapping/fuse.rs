@@ -3,8 +3,8 @@
 
 use crate::config::Config;
 use crate::context::Context;
+use crate::geometry::{CHI2_PIXEL, CHI2_PIXEL_DEPTH};
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::optimize::residual::{CHI2_PIXEL, CHI2_PIXEL_DEPTH};
 use crate::tracking::search::{Best, Projector};
 
 /// Joins duplicates between `keyframe` and its first and second neighbours, both ways.

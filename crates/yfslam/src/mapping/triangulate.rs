@@ -4,15 +4,11 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::context::Context;
 use crate::features::Feature;
-use crate::geometry::{Pose, midpoint, skew};
+use crate::geometry::{CHI2_LINE, CHI2_PIXEL, Pose, midpoint, skew};
 use crate::image::RgbImage;
 use crate::map::{KeyFrame, KeyFrameId, LandmarkId, Map};
 use crate::mapping::color_at;
-use crate::optimize::residual::CHI2_PIXEL;
 use crate::tracking::search::Best;
-
-/// χ² with one degree of freedom: limit for the distance from the epipolar line.
-const CHI2_LINE: f64 = 3.84;
 
 /// Matches features without landmark between `keyframe` and its best covisible ones and triangulates them.
 pub(super) fn new_landmarks(

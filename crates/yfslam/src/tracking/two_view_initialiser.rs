@@ -80,8 +80,8 @@ impl TwoViewInitialiser {
         let found = reconstruct(&sensor.pinhole, c, config.depth.corner_sigma_px, &pairs);
         let adjusted = match &found {
             Ok(found) => adjust(context, first, current, &matches, found),
-            Err(refused) => {
-                tracing::debug!(matches = matches.len(), %refused, "two frames make no map yet");
+            Err(error) => {
+                tracing::debug!(matches = matches.len(), %error, "two frames make no map yet");
                 None
             }
         };
