@@ -1,13 +1,15 @@
 //! Pinhole camera with radial-tangential (Brown–Conrady) distortion, as OpenCV defines it.
+//!
+//! In: the calibration. Out: conversions between normalised coordinates, distorted pixels and undistorted pixels.
 
 use serde::{Deserialize, Serialize};
 
-/// Frames per second of a camera that states none.
+/// Frames per second of a camera for which no rate is given.
 const DEFAULT_FPS: f64 = 30.0;
-/// Baseline times focal length of an RGB-D camera that states none, px·m. Source: ORB-SLAM2 settings for TUM.
+/// Baseline times focal length of an RGB-D camera for which none is given, px·m. Source: ORB-SLAM2 settings for TUM.
 const DEFAULT_BF: f64 = 40.0;
 
-/// Intrinsic calibration of a camera: of the colour image, to which depth is registered, or of the left image of a rectified pair.
+/// Intrinsic calibration of the colour image, to which depth images are registered, or of the left image of a rectified stereo pair.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -30,7 +32,7 @@ pub struct Camera {
     /// Nominal frames per second.
     #[serde(default = "default_fps")]
     pub fps: f64,
-    /// Baseline times `fx`, px·m: of the stereo pair; of an RGB-D camera it scales the virtual disparity `bf / z` alone.
+    /// Baseline times `fx`, px·m. For a stereo pair it is measured; for an RGB-D camera it only scales the virtual disparity `bf / z`.
     #[serde(default = "default_bf")]
     pub bf: f64,
 }
@@ -44,7 +46,7 @@ fn default_bf() -> f64 {
 }
 
 impl Camera {
-    /// Makes a camera without distortion, at 30 frames per second; all but the size (px) in px.
+    /// Makes a camera without distortion, with 30 frames per second. All arguments are in px.
     pub fn pinhole(width: usize, height: usize, fx: f64, fy: f64, cx: f64, cy: f64) -> Self {
         Self { width, height, fx, fy, cx, cy, distortion: [0.0; 5], fps: DEFAULT_FPS, bf: DEFAULT_BF }
     }
@@ -80,12 +82,12 @@ impl Camera {
         [self.fx * xd + self.cx, self.fy * yd + self.cy]
     }
 
-    /// Inverts [`Camera::distort`] by fixed-point iteration: pixel position to normalised coordinates.
+    /// Returns the normalised coordinates of a pixel position: the inverse of [`Camera::distort`], by fixed-point iteration.
     pub fn undistort(&self, u: f64, v: f64) -> [f64; 2] {
         let [k1, k2, p1, p2, k3] = self.distortion;
         let (xd, yd) = ((u - self.cx) / self.fx, (v - self.cy) / self.fy);
         let (mut x, mut y) = (xd, yd);
-        // 20 rounds reach 1e-9 px for the lenses of the presets; five, the customary number, leave 0.01 px in corners.
+        // 20 iterations reach 1e-9 px for the lenses of the presets; the usual five leave 0.01 px in the image corners.
         for _ in 0..20 {
             let r2 = x * x + y * y;
             let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
@@ -96,7 +98,7 @@ impl Camera {
         [x, y]
     }
 
-    /// Pixel position with the lens distortion removed.
+    /// Returns a pixel position without the lens distortion.
     pub(crate) fn undistort_px(&self, u: f64, v: f64) -> [f64; 2] {
         if self.distortion == [0.0; 5] {
             return [u, v];

@@ -1,7 +1,7 @@
 //! Rotated BRIEF descriptors.
 //!
-//! In: a blurred grey image, corners and their orientations. Out: 256 bits each, one per test pair (Rublee et al., ICCV 2011,
-//! section 4).
+//! In: a blurred grey image, corners and their orientations. Out: a descriptor of 256 bits for each corner, one bit for each test pair
+//! (Rublee et al., ICCV 2011, section 4).
 
 use std::f32::consts::TAU;
 
@@ -12,7 +12,7 @@ use super::fast::Corner;
 use super::pattern::TEST_PAIRS;
 use crate::image::Plane;
 
-/// Orientations for which the pattern is rotated beforehand (the paper takes 30).
+/// Number of orientations for which the rotated pattern is stored (30 in the paper).
 const BINS: usize = 128;
 
 /// Largest distance of a test point from the key point, px of the level.
@@ -21,16 +21,17 @@ pub(crate) const PATTERN_RADIUS: usize = 17;
 /// Rows of the patch.
 const ROWS: usize = 2 * PATTERN_RADIUS + 1;
 
-/// Bytes of a patch: the pixels that rotated and rounded points can reach lie packed, row by row, and fit into 16 vectors of 64.
+/// Bytes of a patch. It holds only the pixels that rotated and rounded test points can reach, row by row; they fit into 16 vectors of
+/// 64 bytes.
 const PATCH: usize = 1024;
 
-/// Bytes copied per row; each row overwrites what the one before copied too much.
+/// Bytes copied for each row; each row overwrites the surplus bytes of the one before.
 const COPIED: usize = 36;
 
-/// Patches copied before the first is read: reading across several fresh writes would stall.
+/// Number of patches that are copied before the first is read: a read that spans several recent writes would stall the processor.
 const BATCH: usize = 8;
 
-/// Pixels left and right of the middle in each row of the patch: all within √½ px, the rounding, of the pattern's disc.
+/// Half the width of each row of the patch, px: it covers the disc of the pattern enlarged by √½ px, the largest rounding error.
 const HALF_WIDTH: [usize; ROWS] = {
     let mut half_width = [0; ROWS];
     let mut row = 0;
@@ -46,7 +47,7 @@ const HALF_WIDTH: [usize; ROWS] = {
     half_width
 };
 
-/// Position of each row in the patch.
+/// Offset of each row in the patch.
 const START: [usize; ROWS] = {
     let mut start = [0; ROWS];
     let mut row = 1;
@@ -58,30 +59,31 @@ const START: [usize; ROWS] = {
     start
 };
 
-/// Positions in the patch of 64 points.
+/// Positions of 64 test points in the patch.
 #[derive(Clone, Debug)]
 struct Points {
     position: [u16; 64],
-    /// The same, split into a block of 128 bytes and the byte therein.
+    /// The same positions as the index of a block of 128 bytes and the offset in that block.
     block: [u8; 64],
     in_block: [u8; 64],
 }
 
-/// First and second points of the test pairs, 64 pairs for each word of the descriptor.
+/// First and second points of the test pairs, with 64 pairs for each word of the descriptor.
 type Pattern = [[Points; 2]; 4];
 
-/// Computes descriptors; holds the pattern in all orientations.
+/// Pattern in all orientations, from which descriptors are computed.
 #[derive(Clone, Debug)]
 pub(crate) struct Describer {
     patterns: Vec<Pattern>,
 }
 
 impl Describer {
+    /// Rotates the pattern to all orientations.
     pub(super) fn new() -> Self {
         Self { patterns: (0..BINS).map(|bin| rotated(bin as f32 * TAU / BINS as f32)).collect() }
     }
 
-    /// Appends the descriptor of each corner; bit `i` says that the first point of pair `i` is darker than the second.
+    /// Appends the descriptor of each corner; bit `i` is set if the first point of pair `i` is darker than the second.
     pub(super) fn describe(
         &self,
         level: Level,
@@ -113,7 +115,7 @@ impl Describer {
             }
             for (patch, angle_rad) in patches.iter().zip(angles) {
                 let pattern = &self.patterns[(angle_rad * (BINS as f32 / TAU) + 0.5) as usize % BINS];
-                // A vector as wide as that finds bytes faster than memory does.
+                // A table look-up in vectors of 64 bytes is faster than loading single bytes.
                 let wide = S::u8s::LEN == 64;
                 out.push(if wide { compare_wide(simd, patch, pattern) } else { compare(simd, patch, pattern) });
             }
@@ -121,7 +123,7 @@ impl Describer {
     }
 }
 
-/// Fetches the points one by one, then compares them in vectors.
+/// Loads the points one by one, then compares them in vectors.
 #[inline(always)]
 fn compare<S: Simd>(simd: S, patch: &[u8; PATCH + COPIED], pattern: &Pattern) -> Descriptor {
     let mut words = [0; 4];
@@ -136,7 +138,7 @@ fn compare<S: Simd>(simd: S, patch: &[u8; PATCH + COPIED], pattern: &Pattern) ->
     Descriptor(words)
 }
 
-/// Looks 64 points up at a time, in a patch held by 16 vectors.
+/// Looks up 64 points at a time in a patch held by 16 vectors.
 #[inline(always)]
 fn compare_wide<S: Simd>(simd: S, patch: &[u8; PATCH + COPIED], pattern: &Pattern) -> Descriptor {
     let mut blocks = [[u8x64::splat(simd, 0); 2]; 8];
@@ -157,14 +159,14 @@ fn compare_wide<S: Simd>(simd: S, patch: &[u8; PATCH + COPIED], pattern: &Patter
 fn look_up<S: Simd>(simd: S, blocks: &[[u8x64<S>; 2]; 8], points: &Points) -> u8x64<S> {
     let index = u8x64::from_slice(simd, &points.in_block);
     let block = u8x64::from_slice(simd, &points.block);
-    let mut found = u8x64::splat(simd, 0);
+    let mut pixels = u8x64::splat(simd, 0);
     for (i, [low, high]) in blocks.iter().enumerate() {
-        found = block.simd_eq(i as u8).select(low.concat_swizzle_dyn(*high, index), found);
+        pixels = block.simd_eq(i as u8).select(low.concat_swizzle_dyn(*high, index), pixels);
     }
-    found
+    pixels
 }
 
-/// The test pairs rotated by `angle_rad`, rounded to pixels.
+/// Rotates the test pairs by `angle_rad` and rounds them to pixels.
 fn rotated(angle_rad: f32) -> Pattern {
     let (sin, cos) = angle_rad.sin_cos();
     let position = |[u, v]: [i8; 2]| {
@@ -198,7 +200,7 @@ mod tests {
 
     const SIDE: usize = 2 * PATTERN_RADIUS + 1;
 
-    /// A descriptor by its definition, at the orientation of a bin.
+    /// Computes a descriptor by its definition, at the orientation of a bin.
     fn expected(patch: &GrayImage, bin: usize) -> Descriptor {
         let (sin, cos) = (bin as f32 * TAU / BINS as f32).sin_cos();
         let mut words = [0; 4];
@@ -206,7 +208,8 @@ mod tests {
             let [xa, ya, xb, yb] = pair.map(f32::from);
             let [a, b] = [(xa, ya), (xb, yb)].map(|(x, y)| {
                 let (column, row) = ((x * cos - y * sin).round() as isize, (x * sin + y * cos).round() as isize);
-                patch.row(PATTERN_RADIUS.strict_add_signed(row))[PATTERN_RADIUS.strict_add_signed(column)]
+                let at = |offset| PATTERN_RADIUS.checked_add_signed(offset).unwrap();
+                patch.row(at(row))[at(column)]
             });
             words[i / 64] |= u64::from(a < b) << (i % 64);
         }
@@ -230,10 +233,10 @@ mod tests {
             let patch = GrayImage::from_vec(SIDE, SIDE, patch).unwrap();
             let corner = Corner { x: PATTERN_RADIUS as u16, y: PATTERN_RADIUS as u16, score: 0 };
             for level in levels() {
-                let mut found = Vec::new();
+                let mut descriptors = Vec::new();
                 let angle_rad = bin as f32 * TAU / BINS as f32;
-                Describer::new().describe(level, &Plane::from(&patch), &[corner], &[angle_rad], &mut found);
-                prop_assert_eq!(&found[..], &[expected(&patch, bin)], "{:?}", level);
+                Describer::new().describe(level, &Plane::from(&patch), &[corner], &[angle_rad], &mut descriptors);
+                prop_assert_eq!(&descriptors[..], &[expected(&patch, bin)], "{:?}", level);
             }
         }
     }

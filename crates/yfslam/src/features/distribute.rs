@@ -1,20 +1,20 @@
 //! Even distribution of corners over the image.
 //!
-//! In: the corners of a level. Out: at most so many of them as asked for, the strongest of each quadtree node (ORB-SLAM2,
+//! In: the corners of a level and a quota. Out: at most that many of them, the strongest of each node of a quadtree (ORB-SLAM2,
 //! IEEE T-RO 2017, section III: features evenly distributed on all levels).
 //!
-//! Corners sorted along the Z-order curve are the quadtree: each node is a range of them.
+//! The quadtree is the list of corners sorted along the Z-order curve: each node is a range of that list.
 
 use std::cmp::Reverse;
 
 use super::fast::Corner;
 
-/// A square of the quadtree.
+/// A node of the quadtree: the corners `start..end` of the sorted list.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     start: usize,
     end: usize,
-    /// log2 of the side, px.
+    /// log2 of the side of its square, px.
     depth: u32,
 }
 
@@ -24,10 +24,10 @@ impl Node {
     }
 }
 
-/// Thins corners out; keeps its buffers.
+/// Buffers of the selection of corners, reused from level to level.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Distributor {
-    /// Corners as numbers: position on the Z-order curve, then the score in the lowest byte.
+    /// Corners as integers: the position on the Z-order curve in the upper bits, the score in the lowest byte.
     sorted: Vec<u64>,
     swap: Vec<u64>,
     counts: Vec<u32>,
@@ -36,7 +36,7 @@ pub(crate) struct Distributor {
 }
 
 impl Distributor {
-    /// Reduces `corners` to at most `quota`, evenly spread.
+    /// Reduces `corners` to at most `quota` corners that are distributed evenly.
     pub(super) fn select(&mut self, corners: &mut Vec<Corner>, quota: usize) {
         if corners.len() <= quota {
             return;
@@ -55,7 +55,7 @@ impl Distributor {
         while self.split(quota) {}
         corners.clear();
         for node in &self.nodes {
-            // Of equally strong corners the first along the curve.
+            // Of equally strong corners the first along the curve is taken.
             if let Some(best) = self.sorted[node.start..node.end].iter().min_by_key(|&&corner| Reverse(corner & 0xff)) {
                 let position = (best >> 8) as u32;
                 corners.push(Corner { x: even_bits(position), y: even_bits(position >> 1), score: *best as u8 });
@@ -63,7 +63,7 @@ impl Distributor {
         }
     }
 
-    /// One stable pass of radix sort by the `bits` bits from `shift` on.
+    /// Runs one stable pass of radix sort by the `bits` bits that begin at bit `shift`.
     fn sort_by_digit(&mut self, shift: u32, bits: u32) {
         let digit = |corner: u64| (corner >> shift) as usize & ((1 << bits) - 1);
         self.counts.clear();
@@ -77,18 +77,18 @@ impl Distributor {
         }
         self.swap.resize(self.sorted.len(), 0);
         for &corner in &self.sorted {
-            let place = &mut self.counts[digit(corner)];
-            self.swap[*place as usize] = corner;
-            *place += 1;
+            let position = &mut self.counts[digit(corner)];
+            self.swap[*position as usize] = corner;
+            *position += 1;
         }
         std::mem::swap(&mut self.sorted, &mut self.swap);
     }
 
-    /// Splits the nodes of more than one corner until there are `quota` nodes; false if no further round can help.
+    /// Splits the nodes with more than one corner while there are fewer than `quota` nodes. Returns whether another round can split more.
     fn split(&mut self, quota: usize) -> bool {
         let splittable = self.nodes.iter().filter(|node| node.len() > 1).count();
         if self.nodes.len() + 3 * splittable > quota {
-            // The fullest first, as not all will be split.
+            // Not all nodes can be split: those with most corners come first.
             self.nodes.sort_unstable_by_key(|node| (Reverse(node.len()), node.start));
         }
         self.next.clear();
@@ -119,7 +119,7 @@ impl Distributor {
     }
 }
 
-/// Position on the Z-order curve: the bits of `x` and `y` interleaved.
+/// Returns the position on the Z-order curve: the bits of `x` and `y` interleaved.
 fn z_order(x: u16, y: u16) -> u32 {
     let spread = |v: u16| {
         let v = u32::from(v);
@@ -131,7 +131,7 @@ fn z_order(x: u16, y: u16) -> u32 {
     spread(x) | spread(y) << 1
 }
 
-/// The bits at even positions of `z`, which is x of [`z_order`].
+/// Returns the bits at even positions of `z`, which are those of x in [`z_order`].
 fn even_bits(z: u32) -> u16 {
     let z = z & 0x5555_5555;
     let z = (z | z >> 1) & 0x3333_3333;
@@ -146,7 +146,7 @@ mod tests {
 
     use super::*;
 
-    /// Corners at distinct positions below `side`.
+    /// Generates corners at distinct positions below `side`.
     fn corners(side: u16) -> impl Strategy<Value = Vec<Corner>> {
         proptest::collection::btree_map((0..side, 0..side), 1u8.., 0..400)
             .prop_map(|corners| corners.into_iter().map(|((x, y), score)| Corner { x, y, score }).collect())
@@ -154,7 +154,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_quota_is_met_by_corners_that_were_there(corners in corners(u16::MAX), quota in 0usize..400) {
+        fn the_quota_is_filled_with_input_corners(corners in corners(u16::MAX), quota in 0usize..400) {
             let mut selected = corners.clone();
             Distributor::default().select(&mut selected, quota);
             prop_assert_eq!(selected.len(), corners.len().min(quota));
@@ -176,23 +176,23 @@ mod tests {
         }
 
         #[test]
-        fn positions_survive_the_curve(x: u16, y: u16) {
+        fn z_order_is_invertible(x: u16, y: u16) {
             let z = z_order(x, y);
             prop_assert_eq!((even_bits(z), even_bits(z >> 1)), (x, y));
         }
     }
 
     #[test]
-    fn a_crowd_does_not_starve_the_rest() {
-        let crowd = (0..1000).map(|i| Corner { x: i % 40, y: i / 40, score: 200 });
-        let rest = (0..48).map(|i| Corner { x: 64 + 64 * (i % 7), y: 64 * (i / 7), score: 10 });
-        let mut selected: Vec<Corner> = crowd.chain(rest).collect();
+    fn a_dense_cluster_does_not_displace_isolated_corners() {
+        let cluster = (0..1000).map(|i| Corner { x: i % 40, y: i / 40, score: 200 });
+        let isolated = (0..48).map(|i| Corner { x: 64 + 64 * (i % 7), y: 64 * (i / 7), score: 10 });
+        let mut selected: Vec<Corner> = cluster.chain(isolated).collect();
         Distributor::default().select(&mut selected, 64);
         assert_eq!(selected.iter().filter(|corner| corner.score == 10).count(), 48);
     }
 
     #[test]
-    fn the_strongest_of_a_neighbourhood_stays() {
+    fn the_strongest_corner_of_a_node_is_selected() {
         let mut selected: Vec<Corner> =
             (0..16).map(|i| Corner { x: i % 4, y: i / 4, score: (7 * i % 16) as u8 }).collect();
         Distributor::default().select(&mut selected, 1);

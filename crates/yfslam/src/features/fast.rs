@@ -1,6 +1,6 @@
 //! FAST-9 corners.
 //!
-//! In: a grey image. Out: local maxima of the corner score (Rosten & Drummond, ECCV 2006; score as in Rosten et al., PAMI 2010).
+//! In: a grey image. Out: the local maxima of the corner score (Rosten & Drummond, ECCV 2006; score as in Rosten et al., PAMI 2010).
 
 use fearless_simd::{Level, dispatch, prelude::*};
 
@@ -14,37 +14,38 @@ pub(crate) struct Corner {
     pub x: u16,
     /// Row in the level, px.
     pub y: u16,
-    /// The largest threshold below which the pixel is still a corner, grey levels.
+    /// Corner score: the pixel is a corner for all thresholds below it, grey levels.
     pub score: u8,
 }
 
-/// Corners of one image, row by row.
+/// Corners of one image, ordered by row and column.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Corners {
-    /// Those whose score exceeds the higher threshold.
+    /// Corners whose score exceeds the higher threshold.
     pub strong: Vec<Corner>,
-    /// Those whose score exceeds the lower threshold only.
+    /// Corners whose score exceeds only the lower threshold.
     pub weak: Vec<Corner>,
 }
 
-/// Where and how corners are sought.
+/// Parameters of the corner search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Search {
     /// Threshold of strong corners, grey levels.
     pub strong: u8,
     /// Threshold of weak corners, grey levels, at most `strong`.
     pub weak: u8,
-    /// Distance from the image's edge within which no corner is sought, at least 4 px.
+    /// Width of the image border without corners, at least 4 px.
     pub border: usize,
 }
 
-/// Replaces `corners` by the pixels whose score exceeds a threshold and all eight neighbours (of equal ones the first stays).
+/// Replaces `corners` by the pixels whose score exceeds a threshold and the scores of all eight neighbours; of neighbours with the same
+/// score the first is a corner.
 ///
 /// `scores` is a buffer for three rows.
 pub(crate) fn detect(level: Level, image: &Plane, search: Search, scores: &mut [Vec<u8>; 3], corners: &mut Corners) {
     corners.strong.clear();
     corners.weak.clear();
-    // Larger images than coordinates can tell are cut off.
+    // Coordinates have 16 bits: pixels of larger images beyond them are ignored.
     let (width, height) = (image.width().min(u16::MAX.into()), image.height().min(u16::MAX.into()));
     if width <= 2 * search.border || height <= 2 * search.border {
         return;
@@ -56,7 +57,7 @@ pub(crate) fn detect(level: Level, image: &Plane, search: Search, scores: &mut [
     dispatch!(level, simd => detect_rows(simd, image, search, size, scores, corners));
 }
 
-/// Scores row after row, one pixel more than sought on each side, and looks for maxima in the last three.
+/// Computes the scores row by row, with one more pixel on each side, and appends the maxima of the last three rows.
 #[inline(always)]
 fn detect_rows<S: Simd>(
     simd: S,
@@ -76,7 +77,7 @@ fn detect_rows<S: Simd>(
     }
 }
 
-/// Scores of the `len` pixels from `image.data()[start]` on; 0 where the score does not exceed `threshold`.
+/// Computes the scores of `len` pixels that begin at `image.data()[start]`; 0 where the score does not exceed `threshold`.
 #[inline(always)]
 fn score_row<S: Simd>(simd: S, image: &Plane, start: usize, len: usize, threshold: u8, scores: &mut [u8]) {
     let lanes = S::u8s::LEN;
@@ -90,13 +91,13 @@ fn score_row<S: Simd>(simd: S, image: &Plane, start: usize, len: usize, threshol
     let zero = S::u8s::splat(simd, 0);
     let none = S::u8s::splat(simd, threshold);
     for x in (0..len).step_by(lanes) {
-        // Windows of known length spare the bounds checks below.
+        // Windows of known length make the bounds checks below unnecessary.
         let mut window = rows;
         for i in 0..7 {
             window[i] = &rows[i][x..x + lanes + 6];
         }
         let centre = load(simd, window[3], 3);
-        // Nine circle pixels in a row cover two neighbouring compass points.
+        // Nine adjacent pixels of the circle always contain two neighbouring compass points.
         let [n, e] = [load(simd, window[0], 3), load(simd, window[3], 6)];
         let [s, w] = [load(simd, window[6], 3), load(simd, window[3], 0)];
         let bright = n.max(s).min(e.max(w)).saturating_sub(centre).simd_gt(none).any_true();
@@ -120,7 +121,7 @@ fn score_row<S: Simd>(simd: S, image: &Plane, start: usize, len: usize, threshol
     }
 }
 
-/// The pixels on the circles around the centres from `window[3][3]` on, clockwise from twelve o'clock.
+/// Loads the pixels on the circles around the centres that begin at `window[3][3]`, clockwise from the top.
 #[inline(always)]
 fn circle<S: Simd>(simd: S, window: &[&[u8]; 7]) -> [S::u8s; 16] {
     [
@@ -143,9 +144,9 @@ fn circle<S: Simd>(simd: S, window: &[&[u8]; 7]) -> [S::u8s; 16] {
     ]
 }
 
-/// Over all arcs of nine in a circle of 16, the largest of the smallest values.
+/// Returns the largest of the minima over all arcs of nine pixels of a circle of 16.
 ///
-/// The arcs that start at i − 1 and at i share the eight values from i on, so only every other group of eight is needed.
+/// The arcs that start at i − 1 and at i share the eight values that start at i, so that only every second group of eight is needed.
 #[inline(always)]
 fn best_arc<S: Simd>(v: [S::u8s; 16]) -> S::u8s {
     let mut two = [v[0]; 8];
@@ -164,7 +165,7 @@ fn best_arc<S: Simd>(v: [S::u8s; 16]) -> S::u8s {
     a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h)))
 }
 
-/// Appends the local maxima among the inner `width` scores of the middle one of three rows, which is row `y` of the image.
+/// Appends the local maxima among the inner `width` scores of the middle of three rows, which is row `y` of the image.
 #[inline(always)]
 fn emit_maxima<S: Simd>(simd: S, rows: [&[u8]; 3], width: usize, search: Search, y: usize, corners: &mut Corners) {
     let [above, row, below] = rows;
@@ -199,7 +200,7 @@ mod tests {
     use crate::image::kernels::tests::levels;
     use crate::image::plane::tests::images;
 
-    /// The Bresenham circle of radius 3, px: columns and rows, clockwise from twelve o'clock.
+    /// The Bresenham circle of radius 3 px: columns and rows, clockwise from the top.
     const CIRCLE: [(isize, isize); 16] = [
         (0, -3),
         (1, -3),
@@ -219,9 +220,11 @@ mod tests {
         (-1, -3),
     ];
 
-    /// The corner score by its definition.
+    /// Computes the corner score by its definition.
     fn score(image: &Plane, x: usize, y: usize) -> u8 {
-        let pixel = |(dx, dy): (isize, isize)| i16::from(image.row(y.strict_add_signed(dy))[x.strict_add_signed(dx)]);
+        let pixel = |(dx, dy): (isize, isize)| {
+            i16::from(image.row(y.checked_add_signed(dy).unwrap())[x.checked_add_signed(dx).unwrap()])
+        };
         let diff = CIRCLE.map(|offset| pixel(offset) - pixel((0, 0)));
         let best_arc = |sign: i16| {
             (0..16).map(|start| (start..start + 9).map(|i| sign * diff[i % 16]).min().unwrap()).max().unwrap()

@@ -1,6 +1,6 @@
-//! The features of one RGB-D frame: undistorted, with depth and trust, and a grid to find them by position.
+//! The features of one frame: undistorted, with depth and trust, and a grid for the search by position.
 //!
-//! In: key points and descriptors of the grey image, the depth image, the camera. Out: [`FrameFeatures`].
+//! In: keypoints and descriptors of the grey image, the depth image, the camera. Out: [`FrameFeatures`].
 
 use crate::camera::Camera;
 use crate::features::{Descriptor, Features};
@@ -11,34 +11,34 @@ const GRID_COLUMNS: usize = 64;
 /// Rows of the search grid. Source: ORB-SLAM2.
 const GRID_ROWS: usize = 48;
 
-/// One feature of a frame.
+/// A feature of a frame: a keypoint with its depth and trust.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feature {
-    /// Position in the image as the camera saw it, px.
+    /// Position in the distorted image, px.
     pub raw: [f32; 2],
     /// Undistorted column, px.
     pub u: f32,
     /// Undistorted row, px.
     pub v: f32,
-    /// Pyramid level.
+    /// Pyramid level, 0 is the finest.
     pub octave: u8,
-    /// Orientation, radians.
+    /// Orientation, rad.
     pub angle_rad: f32,
-    /// Depth along the optical axis, m, if the sensor measured one.
+    /// Depth along the optical axis, m; `None` if it was not measured.
     pub depth_m: Option<f32>,
-    /// How far the feature may be trusted to be static, in [0, 1]; 0 keeps it out of pose and map.
+    /// Trust: the probability that the feature is static, in [0, 1]. With 0 it is used for neither the pose nor the map.
     pub trust: f32,
 }
 
-/// All features of a frame, with their descriptors at the same index.
+/// The features of a frame; descriptor `i` belongs to feature `i`.
 #[derive(Clone, Debug, Default)]
 pub struct FrameFeatures {
-    /// The features.
+    /// Features.
     pub features: Vec<Feature>,
-    /// Their descriptors.
+    /// Descriptors of the features.
     pub descriptors: Vec<Descriptor>,
     bounds: ImageBounds,
-    /// Feature indices ordered by cell; the cell `c` holds `order[start[c]..start[c + 1]]`.
+    /// Feature indices ordered by grid cell; cell `c` has `order[start[c]..start[c + 1]]`.
     order: Vec<u32>,
     start: Vec<u32>,
 }
@@ -46,18 +46,18 @@ pub struct FrameFeatures {
 /// Extent of the undistorted image, px.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ImageBounds {
-    /// Left.
+    /// Left border.
     pub u_min: f32,
-    /// Right.
+    /// Right border.
     pub u_max: f32,
-    /// Top.
+    /// Upper border.
     pub v_min: f32,
-    /// Bottom.
+    /// Lower border.
     pub v_max: f32,
 }
 
 impl ImageBounds {
-    /// The undistorted extent of the camera's image: the box around its undistorted border.
+    /// Computes the bounding box of the undistorted image border.
     pub(crate) fn of(camera: &Camera) -> Self {
         let (w, h) = (camera.width as f64, camera.height as f64);
         let border = (0..=16).flat_map(|i| {
@@ -75,14 +75,14 @@ impl ImageBounds {
         bounds
     }
 
-    /// Whether an undistorted position lies inside.
+    /// Returns whether an undistorted position lies inside.
     pub(crate) fn contains(&self, u: f32, v: f32) -> bool {
         u >= self.u_min && u < self.u_max && v >= self.v_min && v < self.v_max
     }
 }
 
 impl FrameFeatures {
-    /// Refills `self` from one frame's key points; all features start trusted. Buffers are reused.
+    /// Replaces the features by those of another frame, all with trust 1. Buffers are reused.
     pub(crate) fn fill(&mut self, extracted: &Features, depth: &DepthImage, camera: &Camera, bounds: ImageBounds) {
         self.bounds = bounds;
         self.descriptors.clone_from(&extracted.descriptors);
@@ -99,28 +99,27 @@ impl FrameFeatures {
                 trust: 1.0,
             }
         }));
-        self.index();
+        self.build_grid();
     }
 
-    /// Features that were taken apart, put together again; `descriptors[i]` is that of `features[i]`.
+    /// Makes frame features of existing features; `descriptors[i]` belongs to `features[i]`.
     pub(crate) fn from_parts(features: Vec<Feature>, descriptors: Vec<Descriptor>, bounds: ImageBounds) -> Self {
-        let mut whole = Self { features, descriptors, bounds, ..Default::default() };
-        whole.index();
-        whole
+        let mut frame = Self { features, descriptors, bounds, ..Default::default() };
+        frame.build_grid();
+        frame
     }
 
-    /// Number of features.
+    /// Returns the number of features.
     pub fn len(&self) -> usize {
         self.features.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no features.
     pub fn is_empty(&self) -> bool {
         self.features.is_empty()
     }
 
-    /// Calls `visit` with the index of each feature within `radius` (px, maximum norm) of (u, v) whose octave lies in
-    /// `octaves`.
+    /// Calls `visit` with the index of each feature within `radius` (px, maximum norm) of (u, v) whose octave is in `octaves`.
     #[inline(always)]
     pub(crate) fn for_each_near(
         &self,
@@ -139,7 +138,7 @@ impl FrameFeatures {
         let (c0, r0) = self.cell(u - radius, v - radius);
         let (c1, r1) = self.cell(u + radius, v + radius);
         for row in r0..=r1 {
-            // Cells of a row lie side by side: one run of indices.
+            // The features of adjacent cells of a row have adjacent entries in `order`.
             let from = self.start[row * GRID_COLUMNS + c0] as usize;
             let to = self.start[row * GRID_COLUMNS + c1 + 1] as usize;
             for &i in &self.order[from..to] {
@@ -151,17 +150,17 @@ impl FrameFeatures {
         }
     }
 
-    /// Column and row of the grid cell of a position, clamped to the grid.
+    /// Returns column and row of the grid cell of a position, clamped to the grid.
     fn cell(&self, u: f32, v: f32) -> (usize, usize) {
         let b = &self.bounds;
         let column = (u - b.u_min) / (b.u_max - b.u_min) * GRID_COLUMNS as f32;
         let row = (v - b.v_min) / (b.v_max - b.v_min) * GRID_ROWS as f32;
-        // A float cast saturates: negative and NaN become 0.
+        // The cast of a floating-point number saturates: negative numbers and NaN become 0.
         ((column as usize).min(GRID_COLUMNS - 1), (row as usize).min(GRID_ROWS - 1))
     }
 
-    /// Counting sort of the features into cells.
-    fn index(&mut self) {
+    /// Sorts the features into the cells of the grid, by counting sort.
+    fn build_grid(&mut self) {
         self.start.clear();
         self.start.resize(GRID_COLUMNS * GRID_ROWS + 1, 0);
         self.order.clear();
@@ -176,11 +175,11 @@ impl FrameFeatures {
         for i in (0..self.features.len()).rev() {
             let (c, r) = self.cell(self.features[i].u, self.features[i].v);
             let cell = r * GRID_COLUMNS + c;
-            // Filling each cell from its end: `start[cell + 1]` runs down to the cell's beginning, which is restored below.
+            // Each cell is filled from its end: `start[cell + 1]` decreases to the beginning of the cell; the shift below corrects this.
             self.start[cell + 1] -= 1;
             self.order[self.start[cell + 1] as usize] = i as u32;
         }
-        // Each entry now holds the beginning of the cell before it: shift by one.
+        // Each entry now holds the beginning of the cell before it, so all entries are shifted by one.
         self.start.remove(0);
         self.start.push(self.features.len() as u32);
     }

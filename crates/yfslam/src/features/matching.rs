@@ -1,24 +1,26 @@
-//! Comparing descriptors, and rotation consistency: matches between two images turn by the same angle (ORB-SLAM, IEEE T-RO 2015,
+//! Nearest descriptors, and rotation consistency: correct matches between two images turn by the same angle (ORB-SLAM, IEEE T-RO 2015,
 //! section V-B).
+//!
+//! In: descriptors, or the change of orientation of each match. Out: the two nearest descriptors, or the matches that are outliers.
 
 use fearless_simd::{Level, Simd, dispatch};
 
 use super::Descriptor;
 
-/// One of the descriptors compared with.
+/// A descriptor near a query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Neighbor {
-    /// Its index among all descriptors.
+    /// Index among all descriptors.
     pub index: u32,
-    /// Number of differing bits, 0–256.
+    /// Hamming distance, 0–256.
     pub distance: u32,
 }
 
-/// The nearest and the second nearest to `query` among `descriptors[i]` for all `i` in `candidates`.
+/// Returns the nearest and the second nearest to `query` among `descriptors[i]` for all `i` in `candidates`.
 ///
-/// Of equally near ones the earlier candidate comes first; indices out of range are passed over.
+/// Of equally near ones the earlier candidate comes first; indices out of range are skipped.
 pub(crate) fn two_nearest(query: &Descriptor, descriptors: &[Descriptor], candidates: &[u32]) -> [Option<Neighbor>; 2] {
-    // The baseline of x86-64 has no instruction that counts bits.
+    // Baseline x86-64 has no population count instruction, hence the compilation for each instruction set.
     dispatch!(Level::new(), simd => search(simd, query, descriptors, candidates))
 }
 
@@ -38,22 +40,22 @@ fn search<S: Simd>(_: S, query: &Descriptor, descriptors: &[Descriptor], candida
     [first, second].map(|neighbor| (neighbor.distance < u32::MAX).then_some(neighbor))
 }
 
-/// Bins of the histogram. Source: ORB-SLAM2.
+/// Number of bins of the rotation histogram. Source: ORB-SLAM2.
 const BINS: usize = 30;
 
-/// A histogram of the turn of each match; those outside its three highest bins are outliers.
+/// Histogram of the change of orientation of each match; matches outside its three highest bins are outliers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct RotationHistogram {
     entries: Vec<(u8, u32)>,
 }
 
 impl RotationHistogram {
-    /// Forgets all matches.
+    /// Removes all matches.
     pub(crate) fn clear(&mut self) {
         self.entries.clear();
     }
 
-    /// Notes that match `payload` turned by `turn_rad`, any angle.
+    /// Adds match `payload`, whose orientation changed by `turn_rad` (any angle).
     pub(crate) fn add(&mut self, turn_rad: f32, payload: u32) {
         let turns = turn_rad / std::f32::consts::TAU;
         // The fraction may round up to 1.
@@ -61,8 +63,8 @@ impl RotationHistogram {
         self.entries.push((bin as u8, payload));
     }
 
-    /// Calls `visit` for each match outside the dominant bins. The second and third bin count only if they hold at least a tenth of
-    /// the first.
+    /// Calls `visit` for each match outside the dominant bins. The second and third highest bins are dominant only if they hold at least
+    /// a tenth of the highest.
     pub(crate) fn for_each_outlier(&self, mut visit: impl FnMut(u32)) {
         let mut counts = [0usize; BINS];
         for (bin, _) in &self.entries {
@@ -87,7 +89,7 @@ mod tests {
     use super::*;
 
     fn descriptors() -> impl Strategy<Value = Vec<Descriptor>> {
-        // Few bits set, so that equal distances occur.
+        // Only few bits are set, so that equal distances occur.
         proptest::collection::vec([0u64..4, 0u64..2, 0u64..2, 0u64..2].prop_map(Descriptor), 1..20)
     }
 
@@ -106,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn matches_off_the_common_turn_are_outliers() {
+    fn matches_outside_the_dominant_bins_are_outliers() {
         let mut histogram = RotationHistogram::default();
         for i in 0..40 {
             histogram.add(0.3 + 0.001 * i as f32 - std::f32::consts::TAU, i);

@@ -1,6 +1,6 @@
-//! ORB features: what one image alone tells.
+//! ORB features of one image, and depth from a stereo pair.
 //!
-//! In: a grey image. Out: key points with 256-bit binary descriptors (ORB-SLAM2, IEEE T-RO 2017, section III).
+//! In: a grey image. Out: keypoints with 256-bit binary descriptors (ORB-SLAM2, IEEE T-RO 2017, section III).
 
 mod brief;
 mod cells;
@@ -18,21 +18,21 @@ pub(crate) use frame::ImageBounds;
 pub use frame::{Feature, FrameFeatures};
 pub use orb::{Features, OrbExtractor};
 
-/// Radius of the patch from which orientation and descriptor are read, px of the level (Rublee et al., ICCV 2011: patch 31).
+/// Radius of the patch from which the orientation is computed, px of the level (Rublee et al., ICCV 2011: patch of 31 px).
 pub(crate) const PATCH_RADIUS: usize = 15;
 
-/// A corner found in a pyramid level, in pixels of the full image.
+/// A keypoint: a corner of a pyramid level, in pixels of the full image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct KeyPoint {
     /// Column in the full, distorted image, px (pixel centres at integers).
     pub x: f32,
     /// Row in the full, distorted image, px.
     pub y: f32,
-    /// Pyramid level in which it was found, 0 is the finest.
+    /// Pyramid level of the corner, 0 is the finest.
     pub octave: u8,
-    /// Orientation by intensity centroid, radians in [0, 2π), clockwise in the image (x right, y down).
+    /// Orientation by intensity centroid, rad in [0, 2π), clockwise in the image (x right, y down).
     pub angle_rad: f32,
-    /// Corner strength, comparable within one level.
+    /// Corner score, comparable within one level.
     pub response: f32,
 }
 
@@ -41,7 +41,7 @@ pub struct KeyPoint {
 pub struct Descriptor(pub [u64; 4]);
 
 impl Descriptor {
-    /// Number of differing bits, 0–256.
+    /// Returns the Hamming distance, 0–256.
     #[inline(always)]
     pub fn distance(&self, other: &Self) -> u32 {
         let (a, b) = (&self.0, &other.0);

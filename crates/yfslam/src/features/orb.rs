@@ -1,7 +1,7 @@
-//! The ORB extractor: from an image to key points and descriptors.
+//! The ORB extractor.
 //!
-//! In: a grey image. Out: about [`FeatureConfig::count`] oriented, described corners, finest level first (ORB-SLAM2, IEEE T-RO
-//! 2017, section III; Rublee et al., ICCV 2011).
+//! In: a grey image. Out: about [`FeatureConfig::count`] keypoints with orientation and descriptor, finest level first (ORB-SLAM2, IEEE
+//! T-RO 2017, section III; Rublee et al., ICCV 2011).
 
 use fearless_simd::Level;
 
@@ -14,19 +14,19 @@ use super::{Descriptor, KeyPoint};
 use crate::config::FeatureConfig;
 use crate::image::{BLUR_RADIUS, GrayImage, Plane, Pyramid, blur};
 
-/// Distance from the image's edge within which no key point lies, px of the level: what describes it lies inside.
+/// Width of the image border without keypoints, px of the level: the patch of each descriptor lies inside the blurred image.
 const EDGE: usize = PATTERN_RADIUS + BLUR_RADIUS;
 
-/// The features of one image; key point `i` has descriptor `i`.
+/// The features of one image; descriptor `i` belongs to keypoint `i`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Features {
-    /// Where they are.
+    /// Keypoints.
     pub key_points: Vec<KeyPoint>,
-    /// What they look like.
+    /// Descriptors of the keypoints.
     pub descriptors: Vec<Descriptor>,
 }
 
-/// Extracts ORB features; keeps its buffers from image to image.
+/// Extractor of ORB features. Buffers are reused from image to image.
 #[derive(Clone, Debug)]
 pub struct OrbExtractor {
     config: FeatureConfig,
@@ -39,7 +39,7 @@ pub struct OrbExtractor {
     buffers: Buffers,
 }
 
-/// What one pyramid level needs for itself.
+/// Buffers for one pyramid level.
 #[derive(Clone, Debug, Default)]
 struct Buffers {
     scores: [Vec<u8>; 3],
@@ -50,7 +50,7 @@ struct Buffers {
 }
 
 impl OrbExtractor {
-    /// An extractor for any image size.
+    /// Makes an extractor for images of any size.
     pub fn new(config: &FeatureConfig) -> Self {
         let level = Level::new();
         let pyramid = Pyramid::new(level, config.levels, config.scale_factor);
@@ -67,22 +67,22 @@ impl OrbExtractor {
         }
     }
 
-    /// Scale of each pyramid level relative to the full image, finest (1) first.
+    /// Returns the scale of each pyramid level relative to the full image, finest (1) first.
     pub fn scale_factors(&self) -> &[f32] {
         &self.scale_factors
     }
 
-    /// The pyramid of the last image.
+    /// Returns the pyramid of the last image.
     pub(crate) fn pyramid(&self) -> &Pyramid {
         &self.pyramid
     }
 
-    /// Changes how many features the next images are asked for.
+    /// Sets the number of features to extract from the next images.
     pub(crate) fn set_count(&mut self, count: usize) {
         self.config.count = count;
     }
 
-    /// Replaces `out` by the features of `gray`; an image too small for a patch has none.
+    /// Replaces `out` by the features of `gray`; an image smaller than a patch has none.
     pub fn extract(&mut self, gray: &GrayImage, out: &mut Features) {
         out.key_points.clear();
         out.descriptors.clear();
@@ -92,7 +92,7 @@ impl OrbExtractor {
         self.describe(out);
     }
 
-    /// Finds the corners of all levels; weak ones count only in cells that have no strong one.
+    /// Detects the corners of all levels; weak corners are used only in cells without strong ones.
     fn detect(&mut self) {
         let strong = self.config.fast_threshold;
         let search = Search { strong, weak: self.config.fast_threshold_low.min(strong), border: EDGE };
@@ -102,20 +102,21 @@ impl OrbExtractor {
         }
     }
 
-    /// Thins each level out to its quota: geometric over the levels; what a coarse level lacks goes to the finer ones.
+    /// Reduces the corners of each level to a quota. Quotas are proportional to the inverse scale; what a coarse level does not fill is added
+    /// to the finer ones.
     fn distribute(&mut self) {
-        let mut left = self.config.count;
+        let mut remaining = self.config.count;
         let mut share_left: f32 = self.scale_factors.iter().map(|scale| 1.0 / scale).sum();
         for (corners, scale) in self.corners.iter_mut().zip(&self.scale_factors).rev() {
             let share = 1.0 / scale;
-            let quota = (left as f32 * share / share_left).round() as usize;
-            self.distributor.select(&mut corners.strong, quota.min(left));
-            left -= corners.strong.len();
+            let quota = (remaining as f32 * share / share_left).round() as usize;
+            self.distributor.select(&mut corners.strong, quota.min(remaining));
+            remaining -= corners.strong.len();
             share_left -= share;
         }
     }
 
-    /// Orients and describes the selected corners.
+    /// Computes orientations and descriptors of the selected corners.
     fn describe(&mut self, out: &mut Features) {
         let Buffers { angles, blurred, line, .. } = &mut self.buffers;
         for (octave, (image, corners)) in self.pyramid.planes().iter().zip(&self.corners).enumerate() {
@@ -138,7 +139,7 @@ impl OrbExtractor {
 mod tests {
     use super::*;
 
-    /// Smooth blobs with corners: a checkerboard of random greys, 8 px a field.
+    /// Returns a checkerboard of random greys with fields of 8 px.
     fn texture(width: usize, height: usize) -> GrayImage {
         let data = (0..width * height).map(|i| {
             let (x, y) = ((i % width / 8) as u32, (i / width / 8) as u32);
@@ -161,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_asked_number_is_found_where_there_is_texture() {
+    fn a_textured_image_yields_the_configured_number_of_features() {
         let mut extractor = OrbExtractor::new(&FeatureConfig::default());
         let mut features = Features::default();
         extractor.extract(&texture(640, 480), &mut features);

@@ -1,6 +1,6 @@
 //! Orientation by intensity centroid.
 //!
-//! In: a grey image and a pixel. Out: the angle from the pixel to the centroid of its circular patch (Rublee et al., ICCV 2011,
+//! In: a grey image and a corner. Out: the direction from the corner to the centroid of its circular patch (Rublee et al., ICCV 2011,
 //! section 3.2).
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -14,7 +14,7 @@ use crate::image::Plane;
 /// Columns of the patch, rounded up to whole vectors.
 const COLUMNS: usize = 32;
 
-/// `MASK[v]`: all bits set in the columns that belong to the circular patch in the rows ±`v`.
+/// `MASK[v]`: columns of the circular patch in the rows ±`v`, with all bits set.
 const MASK: [[u8; COLUMNS]; PATCH_RADIUS + 1] = {
     let mut mask = [[0; COLUMNS]; PATCH_RADIUS + 1];
     let mut v = 0;
@@ -32,7 +32,7 @@ const MASK: [[u8; COLUMNS]; PATCH_RADIUS + 1] = {
     mask
 };
 
-/// Replaces `angles` by the orientation of each corner, radians in [0, 2π); their patches must lie inside the image.
+/// Replaces `angles` by the orientation of each corner, rad in [0, 2π); the patches must lie inside the image.
 pub(crate) fn orientations(level: Level, image: &Plane, corners: &[Corner], angles: &mut Vec<f32>) {
     angles.clear();
     dispatch!(level, simd => orient(simd, image, corners, angles));
@@ -61,7 +61,7 @@ const ATAN: [f32; 9] = [
     0.002_866_225_7,
 ];
 
-/// Direction of `(x, y)`, radians in [0, 2π): the same bits on every platform, unlike the system's `atan2`.
+/// Returns the direction of `(x, y)`, rad in [0, 2π), with the same bits on every platform, unlike the `atan2` of the system.
 #[inline(always)]
 fn angle(x: f32, y: f32) -> f32 {
     let (small, large) = if x.abs() < y.abs() { (x.abs(), y.abs()) } else { (y.abs(), x.abs()) };
@@ -79,10 +79,10 @@ fn angle(x: f32, y: f32) -> f32 {
     if angle < TAU { angle } else { 0.0 }
 }
 
-/// First moments in x and y of a patch given by its top left pixel.
+/// Returns the first moments in x and y of a patch given by its upper left pixel.
 ///
-/// Rows +v and −v are taken together: their sum adds to the column sums, their difference, times v, to the moment in y. Even
-/// and odd columns are kept apart as in [`crate::image::kernels`]. All sums fit: 31 · 255 < 2^15, 255 · (1 + … + 15) < 2^15.
+/// Rows +v and −v are combined: their sum is added to the column sums; their difference, times v, is added to the moment in y. Even and
+/// odd columns are separate as in [`crate::image::kernels`]. No sum overflows: 31 · 255 < 2^15 and 255 · (1 + … + 15) < 2^15.
 #[inline(always)]
 fn moments<S: Simd>(simd: S, patch: &[u8], stride: usize) -> [i32; 2] {
     let row = |i: usize, v: usize| {
@@ -115,7 +115,7 @@ mod tests {
 
     const SIDE: usize = 2 * PATCH_RADIUS + 2;
 
-    /// First moments by their definition.
+    /// Computes the first moments by their definition.
     fn expected(image: &GrayImage) -> [i32; 2] {
         let radius = PATCH_RADIUS as i32;
         let mut sums = [0; 2];
@@ -133,8 +133,8 @@ mod tests {
             .prop_map(|data| GrayImage::from_vec(SIDE, SIDE, data).unwrap())
     }
 
-    /// A patch lit where `lit` says so.
-    fn half(lit: impl Fn(usize, usize) -> bool) -> GrayImage {
+    /// Returns a patch that is white where `lit` is true and black elsewhere.
+    fn patch_where(lit: impl Fn(usize, usize) -> bool) -> GrayImage {
         let data = (0..SIDE * SIDE).map(|i| if lit(i % SIDE, i / SIDE) { 255 } else { 0 });
         GrayImage::from_vec(SIDE, SIDE, data.collect()).unwrap()
     }
@@ -153,7 +153,7 @@ mod tests {
         }
 
         #[test]
-        fn the_angle_is_that_of_the_system(x in -600_000i32..600_000, y in -600_000i32..600_000) {
+        fn the_angle_agrees_with_the_system_atan2(x in -600_000i32..600_000, y in -600_000i32..600_000) {
             let found = angle(x as f32, y as f32);
             let expected = f64::from(y).atan2(f64::from(x));
             prop_assert!((0.0..TAU).contains(&found));
@@ -162,13 +162,13 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_moments_fit() {
+    fn the_largest_moments_do_not_overflow() {
         let middle = PATCH_RADIUS;
-        check(&half(|x, _| x > middle));
-        check(&half(|x, _| x < middle));
-        check(&half(|_, y| y > middle));
-        check(&half(|_, y| y < middle));
-        check(&half(|_, _| true));
+        check(&patch_where(|x, _| x > middle));
+        check(&patch_where(|x, _| x < middle));
+        check(&patch_where(|_, y| y > middle));
+        check(&patch_where(|_, y| y < middle));
+        check(&patch_where(|_, _| true));
     }
 
     #[test]
@@ -178,12 +178,12 @@ mod tests {
     }
 
     #[test]
-    fn the_angle_points_at_the_light_clockwise_from_the_right() {
+    fn the_angle_points_to_the_white_half_clockwise_from_the_right() {
         let middle = PATCH_RADIUS;
         let angle = |lit: fn(usize, usize) -> bool| {
             let mut angles = Vec::new();
             let corner = Corner { x: middle as u16, y: middle as u16, score: 0 };
-            orientations(Level::new(), &Plane::from(&half(lit)), &[corner], &mut angles);
+            orientations(Level::new(), &Plane::from(&patch_where(lit)), &[corner], &mut angles);
             angles[0].to_degrees()
         };
         assert!((angle(|x, _| x > PATCH_RADIUS) - 0.0).abs() < 0.1);

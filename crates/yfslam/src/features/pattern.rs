@@ -1,11 +1,10 @@
 //! The 256 test pairs of the descriptor.
 //!
-//! In: nothing. Out: a table of numbers, learned as in Rublee et al. (ICCV 2011, section 4.3) but with Fisher's criterion.
-//!
-//! Learned by `cargo run --release --example learn_pattern -- persons/*.pgm` from 3,055 photos of people, six patches each (18,330),
-//! turned into PGM by `mogrify -format pgm -colorspace Gray *.webp`. The example says how.
+//! The table was learned as in Rublee et al. (ICCV 2011, section 4.3) but with Fisher's criterion, by
+//! `cargo run --release --example learn_pattern -- persons/*.pgm`. The input were 3,055 photos of people with six patches each (18,330),
+//! converted to PGM by `mogrify -format pgm -colorspace Gray *.webp`. The example describes the method.
 
-/// Test pairs `[x_a, y_a, x_b, y_b]`, px relative to the key point at orientation 0, all within
+/// Test pairs `[x_a, y_a, x_b, y_b]`, px relative to the keypoint at orientation 0, all within
 /// [`PATTERN_RADIUS`](super::brief::PATTERN_RADIUS).
 #[rustfmt::skip]
 pub(crate) const TEST_PAIRS: [[i8; 4]; 256] = [

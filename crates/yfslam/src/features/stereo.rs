@@ -1,7 +1,7 @@
-//! Depth from the right picture of a rectified stereo pair (ORB-SLAM2, IEEE T-RO 2017, section III-A).
+//! Depth from a rectified stereo pair (ORB-SLAM2, IEEE T-RO 2017, section III-A).
 //!
-//! In: the features of the left picture with its pyramid, and those of the right. Out: a depth for each left feature that was found
-//! again: along its row by descriptor, then to a fraction of a pixel by the sum of absolute differences (SAD) of the patches.
+//! In: features and pyramids of both images. Out: a depth for each left feature that was matched, along its row by descriptor, then to a
+//! fraction of a pixel by the sum of absolute differences (SAD) of image patches.
 
 use fearless_simd::{Level, Simd, dispatch};
 
@@ -10,7 +10,7 @@ use crate::config::{FeatureConfig, StereoConfig};
 use crate::features::{Descriptor, Features};
 use crate::image::{GrayImage, Plane, RgbImage, gray_from_rgb};
 
-/// One picture with its features.
+/// The right image with its features.
 #[derive(Debug)]
 pub(crate) struct StereoView {
     gray: GrayImage,
@@ -21,28 +21,28 @@ pub(crate) struct StereoView {
     start: Vec<u32>,
 }
 
-/// Finds the features of the left picture in the right one. Buffers are reused from frame to frame.
+/// Matcher of left features in the right image. Buffers are reused from frame to frame.
 #[derive(Clone, Debug)]
 pub(crate) struct StereoMatcher {
     config: StereoConfig,
-    /// Baseline times focal length, px·m, and the largest disparity, px.
+    /// Baseline times focal length, px·m.
     bf: f32,
     max_disparity_px: f32,
-    found: Vec<Match>,
+    matches: Vec<StereoMatch>,
     sads: Vec<u32>,
     patch: Patch,
 }
 
-/// A left feature that was found again.
+/// A left feature that was matched in the right image.
 #[derive(Clone, Copy, Debug)]
-struct Match {
+struct StereoMatch {
     feature: u32,
     disparity_px: f32,
     sad: u32,
 }
 
 impl StereoView {
-    /// Extracts features as `config` says.
+    /// Makes a view without features; `config` configures the extractor.
     pub(crate) fn new(config: &FeatureConfig) -> Self {
         Self {
             gray: GrayImage::default(),
@@ -53,7 +53,7 @@ impl StereoView {
         }
     }
 
-    /// Extracts about `count` features of the next image.
+    /// Extracts about `count` features of `image`.
     pub(crate) fn extract(&mut self, image: &RgbImage, count: usize) {
         gray_from_rgb(image, &mut self.gray);
         self.extractor.set_count(count);
@@ -61,7 +61,7 @@ impl StereoView {
         self.sort_by_row();
     }
 
-    /// Counting sort of the features by row.
+    /// Sorts the features by row, by counting sort.
     fn sort_by_row(&mut self) {
         let points = &self.features.key_points;
         self.start.clear();
@@ -74,7 +74,7 @@ impl StereoView {
             self.start[y] += self.start[y - 1];
         }
         for (i, point) in points.iter().enumerate().rev() {
-            // Filled from its end, each entry runs down to the beginning of the row before.
+            // Each row is filled from its end: the entry decreases to the beginning of the row; the rotation below corrects this.
             self.start[row(point) + 1] -= 1;
             self.order[self.start[row(point) + 1] as usize] = i as u32;
         }
@@ -84,7 +84,7 @@ impl StereoView {
         }
     }
 
-    /// Indices of the features in the rows from `low` to `high`, px.
+    /// Returns the indices of the features in the rows from `low` to `high`, px.
     fn in_rows(&self, low: f32, high: f32) -> &[u32] {
         let Some(last) = self.start.len().checked_sub(2) else { return &[] };
         let (low, high) = ((low as usize).min(last), (high as usize).min(last));
@@ -93,54 +93,55 @@ impl StereoView {
 }
 
 impl StereoMatcher {
-    /// For a camera of which `bf` is the baseline times the focal length `fx`, px·m.
+    /// Makes a matcher for a stereo pair with focal length `fx`, px, and baseline times focal length `bf`, px·m.
     pub(crate) fn new(config: &StereoConfig, bf: f64, fx: f64) -> Self {
         Self {
             config: config.clone(),
             bf: bf as f32,
             max_disparity_px: (fx / config.min_depth_baselines) as f32,
-            found: Vec::new(),
+            matches: Vec::new(),
             sads: Vec::new(),
             patch: Patch::default(),
         }
     }
 
-    /// Calls `tell` with the index and the depth, m, of each feature of `left` that is in `right` too; `extractor` has just found those
-    /// of `left`.
+    /// Calls `visit` with the index and the depth, m, of each feature of `left` that was matched in `right`. `extractor` must hold the
+    /// pyramid of the left image.
     pub(crate) fn match_rows(
         &mut self,
         extractor: &OrbExtractor,
         left: &Features,
         right: &StereoView,
-        mut tell: impl FnMut(usize, f32),
+        mut visit: impl FnMut(usize, f32),
     ) {
-        // Compiled for each instruction set: the baseline of x86-64 counts no bits and sums few differences at a time.
-        dispatch!(Level::new(), simd => self.find_all(simd, extractor, left, right));
-        // A grey level for each pixel is no difference.
+        // Compiled for each instruction set: baseline x86-64 has no population count and sums only few differences at a time.
+        dispatch!(Level::new(), simd => self.match_all(simd, extractor, left, right));
+        // A mean difference below one grey level is within the noise, whatever the median.
         let pixels = (2 * self.config.window_px + 1).pow(2) as f32;
         let limit = self.config.max_sad_medians * self.median_sad().max(pixels);
-        for m in self.found.iter().filter(|m| m.sad as f32 <= limit) {
-            tell(m.feature as usize, self.bf / m.disparity_px);
+        for m in self.matches.iter().filter(|m| m.sad as f32 <= limit) {
+            visit(m.feature as usize, self.bf / m.disparity_px);
         }
     }
 
     #[inline(always)]
-    fn find_all<S: Simd>(&mut self, _: S, extractor: &OrbExtractor, left: &Features, right: &StereoView) {
-        self.found.clear();
+    fn match_all<S: Simd>(&mut self, _: S, extractor: &OrbExtractor, left: &Features, right: &StereoView) {
+        self.matches.clear();
         for (i, (point, descriptor)) in left.key_points.iter().zip(&left.descriptors).enumerate() {
-            let Some(guess) = self.most_alike(extractor, point, descriptor, right) else { continue };
+            let Some(guess) = self.nearest_by_descriptor(extractor, point, descriptor, right) else { continue };
             if let Some((disparity_px, sad)) = self.refine(extractor, point, guess, right)
                 && disparity_px >= self.config.min_disparity_px
                 && disparity_px <= self.max_disparity_px
             {
-                self.found.push(Match { feature: i as u32, disparity_px, sad });
+                self.matches.push(StereoMatch { feature: i as u32, disparity_px, sad });
             }
         }
     }
 
-    /// Column of the right feature that looks most like a left one, among those that may be the same point.
+    /// Returns the column of the right feature with the descriptor nearest to that of a left feature, among those with a possible row,
+    /// octave and disparity.
     #[inline(always)]
-    fn most_alike(
+    fn nearest_by_descriptor(
         &self,
         extractor: &OrbExtractor,
         point: &KeyPoint,
@@ -148,7 +149,7 @@ impl StereoMatcher {
         right: &StereoView,
     ) -> Option<f32> {
         let band = self.config.row_band_px * extractor.scale_factors()[usize::from(point.octave)];
-        // Rows of features are pixel centres: below −0.5 + band there is none.
+        // No feature lies above row −0.5, so that a negative bound may saturate at 0.
         let candidates = right.in_rows(point.y - band, point.y + band);
         let mut best = (self.config.max_distance + 1, None);
         for &j in candidates {
@@ -156,7 +157,7 @@ impl StereoMatcher {
             let disparity_px = point.x - other.x;
             if (other.y - point.y).abs() <= band
                 && other.octave.abs_diff(point.octave) <= 1
-                // A corner may be found a pixel of its level aside.
+                // The position of a corner may be wrong by a pixel of its level.
                 && disparity_px >= -band
                 && disparity_px <= self.max_disparity_px + band
             {
@@ -169,8 +170,8 @@ impl StereoMatcher {
         best.1
     }
 
-    /// Disparity to a fraction of a pixel, px, and the SAD there: the left patch slides along the right picture around `guess`, both at
-    /// the level of the feature.
+    /// Refines the disparity to a fraction of a pixel: the left patch slides along the right image around column `guess`, both at the
+    /// level of the feature. Returns the disparity, px, and the least SAD.
     #[inline(always)]
     fn refine(
         &mut self,
@@ -186,40 +187,40 @@ impl StereoMatcher {
         let (left, right) = (&extractor.pyramid().planes()[octave], &right.extractor.pyramid().planes()[octave]);
         let (half, slide) = (self.config.window_px, self.config.slide_px);
         self.sads.clear();
-        self.patch.take(left, x, y, half)?;
+        self.patch.copy_from(left, x, y, half)?;
         self.patch.slide(right, guess - slide as isize, y, 2 * slide + 1, &mut self.sads)?;
         let (best, &sad) = self.sads.iter().enumerate().min_by_key(|(_, sad)| **sad)?;
-        // The least must lie between two others to be one.
+        // A minimum needs a neighbour on each side.
         let (before, after) = (*self.sads.get(best.checked_sub(1)?)?, *self.sads.get(best + 1)?);
         let (before, middle, after) = (before as f32, sad as f32, after as f32);
-        let bend = before - 2.0 * middle + after;
-        let fraction = if bend > 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
+        let curvature = before - 2.0 * middle + after;
+        let fraction = if curvature > 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
         let column = (guess - slide as isize) as f32 + best as f32 + fraction;
         Some(((x as f32 - column) * scale, sad))
     }
 
-    /// Median SAD of all matches.
+    /// Returns the median SAD of all matches, 0 if there are none.
     fn median_sad(&mut self) -> f32 {
         self.sads.clear();
-        self.sads.extend(self.found.iter().map(|m| m.sad));
+        self.sads.extend(self.matches.iter().map(|m| m.sad));
         let middle = self.sads.len() / 2;
         if self.sads.is_empty() { 0.0 } else { *self.sads.select_nth_unstable(middle).1 as f32 }
     }
 }
 
-/// A square patch less its mean, so that the pictures' brightness may differ.
+/// A square patch minus its mean, so that the brightness of the two images may differ.
 #[derive(Clone, Debug, Default)]
 struct Patch {
     half: usize,
     pixels: Vec<i16>,
-    /// Column sums of the strip that the patch slides along.
+    /// Column sums of the strip along which the patch slides.
     columns: Vec<u32>,
 }
 
 impl Patch {
-    /// Takes the patch around (x, y) of `plane`; `None` if it reaches beyond the border.
+    /// Copies the patch around (x, y) of `plane`; `None` if it exceeds the image.
     #[inline(always)]
-    fn take(&mut self, plane: &Plane, x: isize, y: isize, half: usize) -> Option<()> {
+    fn copy_from(&mut self, plane: &Plane, x: isize, y: isize, half: usize) -> Option<()> {
         self.half = half;
         self.pixels.clear();
         let rows = rows_around(plane, x, y, half, 2 * half + 1)?;
@@ -230,7 +231,7 @@ impl Patch {
         Some(())
     }
 
-    /// Appends the SAD of the patch with `plane` around (x, y), (x + 1, y) and so on, `count` of them; `None` beyond the border.
+    /// Appends the SAD of the patch and `plane` at `count` positions (x, y), (x + 1, y), …; `None` if any exceeds the image.
     #[inline(always)]
     fn slide(&mut self, plane: &Plane, x: isize, y: isize, count: usize, sads: &mut Vec<u32>) -> Option<()> {
         let side = 2 * self.half + 1;
@@ -259,7 +260,7 @@ fn rounded_mean(sum: u32, count: usize) -> i16 {
     ((2 * sum + count as u32) / (2 * count as u32).max(1)) as i16
 }
 
-/// `width` pixels from `x - half` on, of each row from `y - half` to `y + half`; `None` if any lies beyond the border.
+/// Returns `width` pixels from column `x - half`, for each row from `y - half` to `y + half`; `None` if any lies outside the image.
 #[inline(always)]
 fn rows_around(plane: &Plane, x: isize, y: isize, half: usize, width: usize) -> Option<impl Iterator<Item = &[u8]>> {
     let first = usize::try_from(x).ok()?.checked_sub(half)?;

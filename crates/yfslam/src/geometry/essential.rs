@@ -1,32 +1,33 @@
-//! The motions of an essential matrix (Hartley and Zisserman, Multiple View Geometry, section 9.6.2).
+//! Motions from an essential matrix (Hartley and Zisserman, Multiple View Geometry, section 9.6.2).
 //!
-//! In: E with x₂ᵀ E x₁ = 0 for rays of the same points. Out: four motions, of which one puts the points in front of both cameras.
+//! In: E with x₂ᵀ E x₁ = 0 for the rays of corresponding points. Out: four motions, of which one places the points in front of both
+//! cameras.
 
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::Pose;
 
-/// The four motions `t_second_first` of an essential matrix, with baselines of length 1; none if it is not finite.
+/// Returns the four motions `t_second_first` of an essential matrix, with baselines of length 1; none if it is not finite.
 pub(crate) fn motions_of_essential(e: &Matrix3<f64>) -> Vec<Pose> {
     let svd = e.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Vec::new() };
-    // The left null vector is the baseline; nalgebra sorts singular values in descending order.
+    // The baseline is the left null vector, which comes last because nalgebra sorts singular values in descending order.
     let baseline: Vector3<f64> = u.column(2).into();
-    let quarter = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let quarter_turn = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     let mut motions = Vec::with_capacity(4);
-    for turn in [quarter, quarter.transpose()] {
+    for turn in [quarter_turn, quarter_turn.transpose()] {
         let rotation = u * turn * v_t;
         let rotation = rotation * rotation.determinant().signum();
         if !rotation.iter().all(|v| v.is_finite()) {
             return Vec::new();
         }
-        motions.extend(both_ways(rotation, baseline));
+        motions.extend(with_both_signs(rotation, baseline));
     }
     motions
 }
 
-/// The motions of a rotation and a baseline whose sense is open.
-pub(super) fn both_ways(rotation: Matrix3<f64>, baseline: Vector3<f64>) -> [Pose; 2] {
+/// Returns the two motions of a rotation and a baseline whose sign is unknown.
+pub(super) fn with_both_signs(rotation: Matrix3<f64>, baseline: Vector3<f64>) -> [Pose; 2] {
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
     [baseline, -baseline].map(|t| Pose::from_parts(Translation3::from(t), rotation))
 }

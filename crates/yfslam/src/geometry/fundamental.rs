@@ -1,19 +1,19 @@
-//! The fundamental matrix between two pictures (Hartley and Zisserman, Multiple View Geometry, sections 11.2 and 11.6).
+//! The fundamental matrix between two images (Hartley and Zisserman, Multiple View Geometry, sections 11.2 and 11.6).
 //!
-//! In: positions of the same points in both. Out: the matrix F with x₂ᵀ F x₁ = 0 for points that keep still, by RANSAC.
+//! In: positions of the same points in both images. Out: the matrix F with x₂ᵀ F x₁ = 0 for static points, by RANSAC.
 
 use nalgebra::{Matrix3, SMatrix, SymmetricEigen, Vector3};
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
 
-/// A position in the first picture and in the second, px.
+/// Position of a point in the first and in the second image, px.
 pub(crate) type Pair = ([f32; 2], [f32; 2]);
 
-/// Draws at most.
+/// Largest number of RANSAC iterations.
 const MAX_DRAWS: f64 = 500.0;
 
-/// F that most pairs fit within `limit_px` of their epipolar line, sought until it is found with `confidence`; `None` for fewer than
-/// eight pairs.
+/// Estimates F by RANSAC: inliers lie within `limit_px` of their epipolar line; iterations end when a sample without outliers was drawn
+/// with probability `confidence`. `None` for fewer than eight pairs.
 pub(crate) fn fundamental_ransac(
     pairs: &[Pair],
     limit_px: f64,
@@ -24,35 +24,35 @@ pub(crate) fn fundamental_ransac(
         return None;
     }
     let mut best: Option<(usize, Matrix3<f64>)> = None;
-    let (mut draws, mut wanted) = (0.0, MAX_DRAWS);
-    while draws < wanted {
+    let (mut draws, mut needed) = (0.0, MAX_DRAWS);
+    while draws < needed {
         draws += 1.0;
-        let picked: [Pair; 8] =
+        let sample: [Pair; 8] =
             std::array::from_fn(|_| pairs[((u64::from(rng.next_u32()) * pairs.len() as u64) >> 32) as usize]);
-        let Some(f) = eight_point(picked.iter().copied()) else { continue };
+        let Some(f) = eight_point(sample.iter().copied()) else { continue };
         let inliers = pairs.iter().filter(|pair| epipolar_distance(&f, pair) <= limit_px).count();
         if best.is_none_or(|(most, _)| inliers > most) {
             best = Some((inliers, f));
             let share = inliers as f64 / pairs.len() as f64;
-            // No draw of still points alone was met yet if nothing fits: the logarithm of 1 must not turn the sign.
+            // Without inliers the logarithm is 0; the bounds keep the quotient finite and positive.
             let per_draw = (-share.powi(8).min(1.0 - 1e-12)).ln_1p().min(-1e-12);
-            wanted = ((1.0 - confidence).ln() / per_draw).clamp(1.0, MAX_DRAWS);
+            needed = ((1.0 - confidence).ln() / per_draw).clamp(1.0, MAX_DRAWS);
         }
     }
     let (_, f) = best?;
-    // Fewer than eight leave the matrix as it is.
-    let fitting = pairs.iter().filter(|pair| epipolar_distance(&f, pair) <= limit_px).copied();
-    eight_point(fitting).or(Some(f))
+    // The refit needs eight inliers; with fewer the sampled matrix is returned.
+    let inliers = pairs.iter().filter(|pair| epipolar_distance(&f, pair) <= limit_px).copied();
+    eight_point(inliers).or(Some(f))
 }
 
-/// Distance of the second position from the epipolar line of the first, px.
+/// Returns the distance of the second position from the epipolar line of the first, px.
 pub(crate) fn epipolar_distance(f: &Matrix3<f64>, ([x1, y1], [x2, y2]): &Pair) -> f64 {
     let line = f * Vector3::new(f64::from(*x1), f64::from(*y1), 1.0);
     let length = line.x.hypot(line.y);
     (line.x * f64::from(*x2) + line.y * f64::from(*y2) + line.z).abs() / length.max(1e-12)
 }
 
-/// The normalised eight-point algorithm; `None` if the pairs do not determine F.
+/// Computes F by the normalised eight-point algorithm; `None` if the pairs do not determine it.
 pub(super) fn eight_point(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f64>> {
     let row = |a: &Vector3<f64>, b: &Vector3<f64>| {
         [SMatrix::from([b.x * a.x, b.x * a.y, b.x, b.y * a.x, b.y * a.y, b.y, a.x, a.y, 1.0])]
@@ -66,14 +66,15 @@ pub(super) fn eight_point(pairs: impl Iterator<Item = Pair> + Clone) -> Option<M
     f.iter().all(|v| v.is_finite()).then_some(f)
 }
 
-/// The matrix whose nine numbers come nearest to solving `rows` for all pairs, of which there must be `at_least` so many; rows are made of the
-/// normalised positions in the first and the second picture. Before and after it, what normalises those of each.
+/// Solves a homogeneous linear system for a 3 × 3 matrix M (direct linear transform). `rows` returns the equations of one pair of
+/// normalised positions. Returns the normalisation of the first image, M, and the normalisation of the second image; `None` for fewer
+/// than `min_pairs` pairs.
 pub(super) fn direct_linear<const ROWS: usize>(
     pairs: impl Iterator<Item = Pair> + Clone,
-    at_least: usize,
+    min_pairs: usize,
     rows: impl Fn(&Vector3<f64>, &Vector3<f64>) -> [SMatrix<f64, 9, 1>; ROWS],
 ) -> Option<[Matrix3<f64>; 3]> {
-    if pairs.clone().count() < at_least {
+    if pairs.clone().count() < min_pairs {
         return None;
     }
     let to_unit_1 = normalisation(pairs.clone().map(|pair| pair.0))?;
@@ -91,7 +92,7 @@ pub(super) fn direct_linear<const ROWS: usize>(
     Some([to_unit_1, Matrix3::from_row_slice(solution.as_slice()), to_unit_2])
 }
 
-/// Moves the mean of positions to 0 and their mean distance from it to √2.
+/// Returns the similarity that moves the mean of positions to 0 and scales their mean distance from it to √2; `None` if they coincide.
 fn normalisation(positions: impl Iterator<Item = [f32; 2]> + Clone) -> Option<Matrix3<f64>> {
     let count = positions.clone().count() as f64;
     let (sx, sy) = positions.clone().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p[0]), y + f64::from(p[1])));
@@ -114,7 +115,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(16))]
         #[test]
-        fn points_that_keep_still_fit_and_others_do_not(
+        fn static_points_are_inliers_and_moving_points_are_not(
             points in prop::collection::vec((-2f64..2.0, -1.5f64..1.5, 2f64..6.0), 60..90),
             shift in prop::array::uniform3(0.05f64..0.2),
             turn in prop::array::uniform3(-0.05f64..0.05),
@@ -127,15 +128,15 @@ mod tests {
                 .collect();
             let f = fundamental_ransac(&pairs, 0.1, 0.99, &mut Pcg32::new(1, 2)).unwrap();
             prop_assert!(pairs.iter().filter(|pair| epipolar_distance(&f, pair) < 0.1).count() > pairs.len() * 9 / 10);
-            // A quarter of the points walks away by itself.
-            let walkers = pairs.len() / 4;
-            for (k, pair) in pairs.iter_mut().take(walkers).enumerate() {
+            // A quarter of the points moves by itself.
+            let moving = pairs.len() / 4;
+            for (k, pair) in pairs.iter_mut().take(moving).enumerate() {
                 pair.1[k % 2] += 12.0;
             }
             let f = fundamental_ransac(&pairs, 0.1, 0.99, &mut Pcg32::new(1, 2)).unwrap();
-            let off = |pairs: &[Pair]| pairs.iter().filter(|pair| epipolar_distance(&f, pair) > 1.0).count();
-            prop_assert!(off(&pairs[walkers..]) < pairs.len() / 6, "{} {}", off(&pairs[walkers..]), off(&pairs[..walkers]));
-            prop_assert!(off(&pairs[..walkers]) > walkers / 2);
+            let outliers = |pairs: &[Pair]| pairs.iter().filter(|pair| epipolar_distance(&f, pair) > 1.0).count();
+            prop_assert!(outliers(&pairs[moving..]) < pairs.len() / 6, "{} {}", outliers(&pairs[moving..]), outliers(&pairs[..moving]));
+            prop_assert!(outliers(&pairs[..moving]) > moving / 2);
         }
     }
 

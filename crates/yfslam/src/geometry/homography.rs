@@ -1,23 +1,23 @@
-//! The homography between two pictures of a plane (Hartley and Zisserman, Multiple View Geometry, section 4.1) and the motions that it
-//! allows (Ma, Soatto, Košecká and Sastry, An Invitation to 3-D Vision, section 5.3.3).
+//! The homography between two images of a plane (Hartley and Zisserman, Multiple View Geometry, section 4.1) and the motions that explain
+//! it (Ma, Soatto, Košecká and Sastry, An Invitation to 3-D Vision, section 5.3.3).
 //!
-//! In: positions of the same points in both. Out: the matrix H with x₂ ~ H x₁ for points of one plane; of that, motions.
+//! In: positions of the same points in both images. Out: the matrix H with x₂ ~ H x₁ for the points of a plane, and its motions.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::essential::both_ways;
+use super::essential::with_both_signs;
 use super::fundamental::{Pair, direct_linear};
 use crate::geometry::Pose;
 
-/// Spread of the singular values of a homography, relative to the middle one, below which it is a rotation alone.
+/// Difference of the squared singular values of a homography, relative to the middle one, below which it is a pure rotation.
 const MIN_SPREAD: f64 = 1e-6;
 
-/// The normalised direct linear transform; `None` if the pairs do not determine H.
+/// Computes H by the normalised direct linear transform; `None` if the pairs do not determine it.
 pub(super) fn homography(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Matrix3<f64>> {
     let rows = |a: &Vector3<f64>, b: &Vector3<f64>| {
-        [(b.x, 0), (b.y, 3)].map(|(scale, row_of)| {
+        [(b.x, 0), (b.y, 3)].map(|(scale, offset)| {
             let mut row = SMatrix::<f64, 9, 1>::zeros();
-            row.fixed_rows_mut::<3>(row_of).copy_from(a);
+            row.fixed_rows_mut::<3>(offset).copy_from(a);
             row.fixed_rows_mut::<3>(6).copy_from(&(-scale * a));
             row
         })
@@ -27,14 +27,14 @@ pub(super) fn homography(pairs: impl Iterator<Item = Pair> + Clone) -> Option<Ma
     h.iter().all(|v| v.is_finite()).then_some(h)
 }
 
-/// Squared distance of the second position from where H takes the first, px².
+/// Returns the squared distance between the second position and the first one mapped by H, px².
 pub(super) fn transfer_distance2(h: &Matrix3<f64>, ([x1, y1], [x2, y2]): &Pair) -> f64 {
     let p = h * Vector3::new(f64::from(*x1), f64::from(*y1), 1.0);
     (p.x / p.z - f64::from(*x2)).powi(2) + (p.y / p.z - f64::from(*y2)).powi(2)
 }
 
-/// The motions `t_second_first` that explain a homography of rays (K⁻¹ H K), with baselines of length 1; none for a rotation alone.
-/// `x₂ᵀ H x₁` must be positive for what both see. Two of the four put the plane in front of the first camera.
+/// Returns the motions `t_second_first` that explain a homography of rays (K⁻¹ H K), with baselines of length 1; none for a pure rotation.
+/// `x₂ᵀ H x₁` must be positive for points that both cameras observe. Two of the four motions place the plane in front of the first camera.
 pub(super) fn motions_of_homography(h: &Matrix3<f64>) -> Vec<Pose> {
     let svd = h.svd(false, true);
     let mut order = [0, 1, 2];
@@ -48,14 +48,14 @@ pub(super) fn motions_of_homography(h: &Matrix3<f64>) -> Vec<Pose> {
     }
     let (along, across) = (((1.0 - s3).max(0.0) / (s1 - s3)).sqrt(), ((s1 - 1.0).max(0.0) / (s1 - s3)).sqrt());
     let mut motions = Vec::with_capacity(4);
-    // Two directions that keep their length under H, and with v₂ span the two planes that H can be of.
+    // H preserves the length of both vectors u. Each spans, with v₂, one of the two planes that explain H.
     for u in [v1 * along + v3 * across, v1 * along - v3 * across] {
         let normal = v2.cross(&u);
         let before = Matrix3::from_columns(&[v2, u, normal]);
         let (a, b) = (h * v2, h * u);
         let rotation = Matrix3::from_columns(&[a, b, a.cross(&b)]) * before.transpose();
         let Some(baseline) = ((h - rotation) * normal).try_normalize(1e-9) else { continue };
-        motions.extend(both_ways(rotation, baseline));
+        motions.extend(with_both_signs(rotation, baseline));
     }
     motions
 }
@@ -85,7 +85,7 @@ mod tests {
             prop_assume!(points.iter().all(|p| p.z > 0.1 && second(p).z > 0.1));
             let pairs: Vec<Pair> = points.iter().map(|p| (project(*p), project(second(p)))).collect();
             let h = homography(pairs.iter().copied());
-            // Pixels that lie on a line determine nothing.
+            // Pixels on a line do not determine H.
             let spread: f64 = pixels.iter().map(|p| f64::from(p[0] * (pixels[1][1] - pixels[0][1]) - p[1] * (pixels[1][0] - pixels[0][0])).abs()).fold(0.0, f64::max);
             prop_assume!(spread > 5e3);
             let h = h.unwrap();
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rotation_alone_has_no_baseline() {
+    fn a_pure_rotation_has_no_baseline() {
         let rotation = Pose::rotation(Vector3::new(0.1, -0.2, 0.05)).rotation.to_rotation_matrix();
         assert!(motions_of_homography(&(rotation.matrix() * 3.0)).is_empty());
     }

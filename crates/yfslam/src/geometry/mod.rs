@@ -1,5 +1,6 @@
-//! Rigid motions, similarities and the pinhole model in the form the optimisers need.
+//! Rigid motions, similarities, the pinhole model, and poses from two views or three points.
 
+mod chi2;
 mod essential;
 mod fundamental;
 mod homography;
@@ -10,6 +11,7 @@ mod sim3;
 mod triangulate;
 mod two_view;
 
+pub(crate) use chi2::{CHI2_LINE, CHI2_PIXEL, CHI2_PIXEL_DEPTH};
 pub(crate) use essential::motions_of_essential;
 pub(crate) use fundamental::{Pair, epipolar_distance, fundamental_ransac};
 pub(crate) use p3p::p3p;
@@ -24,5 +26,5 @@ pub(crate) use sim3::{
 pub(crate) use triangulate::midpoint;
 pub(crate) use two_view::{TwoView, reconstruct};
 
-/// A rigid motion; `t_a_b` maps points given in frame b into frame a.
+/// A rigid motion; `t_a_b` maps points of frame b into frame a.
 pub type Pose = nalgebra::Isometry3<f64>;

@@ -1,20 +1,20 @@
 //! The pose of a calibrated camera from three points (Grunert 1841, in the form of Haralick, Lee, Ottenberg and Nölle, Review and
 //! Analysis of Solutions of the Three Point Perspective Pose Estimation Problem, IJCV 1994, section 3.1).
 //!
-//! In: three points of the world and the directions in which the camera sees them. Out: up to four poses.
+//! In: three points of the world and the directions in which the camera observes them. Out: up to four poses.
 
 use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::Pose;
 
-/// All `t_cam_world` that map the points (world, m) onto rays of the given directions (camera frame, unit length), in front of the
-/// camera. Empty if the points lie on a line or nothing fits.
+/// Returns all `t_cam_world` that map the points (world, m) onto the rays (camera frame, unit length), in front of the camera. Empty if
+/// the points lie on a line or no pose exists.
 pub(crate) fn p3p(points_world: &[Point3<f64>; 3], rays: &[Vector3<f64>; 3]) -> impl Iterator<Item = Pose> + use<> {
     let [p1, p2, p3] = points_world;
     let (a, b, c) = ((p2 - p3).norm_squared(), (p1 - p3).norm_squared(), (p1 - p2).norm_squared());
     let (cos_a, cos_b, cos_c) = (rays[1].dot(&rays[2]), rays[0].dot(&rays[2]), rays[0].dot(&rays[1]));
     let (difference, sum) = ((a - c) / b, (a + c) / b);
-    // With s₂ = u s₁ and s₃ = v s₁, the three laws of cosines leave a polynomial of fourth degree in v.
+    // With s₂ = u s₁ and s₃ = v s₁, the three laws of cosines reduce to a polynomial of degree four in v.
     let quartic = [
         (1.0 + difference).powi(2) - 4.0 * a / b * cos_c * cos_c,
         4.0 * (-difference * (1.0 + difference) * cos_b + 2.0 * a / b * cos_c * cos_c * cos_b
@@ -39,7 +39,7 @@ pub(crate) fn p3p(points_world: &[Point3<f64>; 3], rays: &[Vector3<f64>; 3]) -> 
     })
 }
 
-/// Real roots of c₀ + c₁ v + … + c₄ v⁴: the real eigenvalues of the companion matrix.
+/// Returns the real roots of c₀ + c₁ v + … + c₄ v⁴: the real eigenvalues of the companion matrix.
 fn real_roots(c: &[f64; 5]) -> [Option<f64>; 4] {
     if c.iter().any(|c| !c.is_finite()) || c[4].abs() < 1e-12 {
         return [None; 4];
@@ -54,11 +54,11 @@ fn real_roots(c: &[f64; 5]) -> [Option<f64>; 4] {
     );
     let Some(schur) = companion.try_schur(1e-14, 100) else { return [None; 4] };
     let roots = schur.complex_eigenvalues();
-    // A double root splits into a pair with small imaginary parts; refinement decides whether it is one.
+    // Rounding splits a double root into a pair with small imaginary parts; the refinement removes false roots.
     std::array::from_fn(|i| (roots[i].im.abs() <= 1e-4 * (1.0 + roots[i].re.abs())).then_some(roots[i].re))
 }
 
-/// Newton's method on the three laws of cosines, for distances from the camera; `None` unless they hold in the end, in front of it.
+/// Refines distances from the camera by Newton's method on the three laws of cosines; `None` unless they converge to positive distances.
 fn refined(mut s: [f64; 3], squares: [f64; 3], cosines: [f64; 3]) -> Option<[f64; 3]> {
     const PAIRS: [(usize, usize); 3] = [(1, 2), (0, 2), (0, 1)];
     let scale = squares.iter().sum::<f64>();
@@ -82,7 +82,7 @@ fn refined(mut s: [f64; 3], squares: [f64; 3], cosines: [f64; 3]) -> Option<[f64
     (error < 1e-8 * scale && s.iter().all(|s| *s > 0.0)).then_some(s)
 }
 
-/// The motion that takes one triangle onto a congruent one; `None` if its corners lie on a line.
+/// Returns the motion that maps triangle `from` onto the congruent triangle `to`; `None` if its corners lie on a line.
 fn aligned(to: &[Point3<f64>; 3], from: &[Point3<f64>; 3]) -> Option<Pose> {
     let axes = |t: &[Point3<f64>; 3]| {
         let x = (t[1] - t[0]).try_normalize(1e-9)?;

@@ -1,18 +1,18 @@
 //! Exponential and logarithm of SE(3) (Barfoot, State Estimation for Robotics, section 7.1).
 //!
-//! Tangent vectors are ordered (ρ, φ): translation part in metres, then rotation in radians.
+//! Tangent vectors are ordered (ρ, φ): translation part, m, then rotation, rad.
 
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3, Vector6};
 
-/// Angle below which the series of the coefficients are used, radians.
+/// Angle below which the coefficients are computed by their series, rad.
 const SMALL_ANGLE: f64 = 1e-4;
 
-/// The matrix of the cross product: `skew(v) * w == v × w`.
+/// Returns the matrix of the cross product: `skew(v) * w == v × w`.
 pub(crate) fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// Exponential map from (ρ, φ) to a rigid motion.
+/// Computes the exponential map from (ρ, φ) to a rigid motion.
 pub(crate) fn se3_exp(xi: &Vector6<f64>) -> Isometry3<f64> {
     let rho = Vector3::new(xi[0], xi[1], xi[2]);
     let phi = Vector3::new(xi[3], xi[4], xi[5]);
@@ -29,15 +29,15 @@ pub(crate) fn se3_exp(xi: &Vector6<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(t), UnitQuaternion::from_scaled_axis(phi))
 }
 
-/// The pose after a left perturbation, `exp(xi) * pose`, with its quaternion brought back to unit length: an error of rounding
-/// doubles with each product of a pose and an inverse, and constant-velocity prediction makes two such products a frame.
+/// Returns the pose after a left perturbation, `exp(xi) * pose`, with its quaternion normalised: the rounding error of its length doubles
+/// with each product of a pose and an inverse, and the constant-velocity model computes two such products in each frame.
 pub(crate) fn perturbed(xi: &Vector6<f64>, pose: &Isometry3<f64>) -> Isometry3<f64> {
     let mut moved = se3_exp(xi) * pose;
     moved.rotation.renormalize();
     moved
 }
 
-/// Logarithm of a rigid motion, the inverse of [`se3_exp`] for rotations below π.
+/// Computes the logarithm of a rigid motion: the inverse of [`se3_exp`] for rotations below π.
 pub(crate) fn se3_log(pose: &Isometry3<f64>) -> Vector6<f64> {
     let phi = pose.rotation.scaled_axis();
     let theta2 = phi.norm_squared();
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn prediction_and_correction_keep_the_rotation_a_rotation() {
+    fn repeated_prediction_and_correction_keep_quaternions_normalised() {
         let mut last = Isometry3::identity();
         let mut velocity = se3_exp(&Vector6::new(0.01, 0.0, 0.02, 0.01, -0.02, 0.005));
         for _ in 0..1000 {

@@ -1,8 +1,9 @@
-//! Similarities: rigid motions with a scale, between maps whose units of length differ (Strasdat, Montiel and Davison, Scale
+//! Similarities: rigid motions with scale, between maps with different units of length (Strasdat, Montiel and Davison, Scale
 //! Drift-Aware Large Scale Monocular SLAM, RSS 2010).
 //!
-//! `s_a_b` maps points given in frame b, in the unit of b, into frame a and its unit: x ↦ s R x + t. One whose scale is exactly 1 does to
-//! the bit what its rigid motion does. Tangent vectors are ordered (ρ, φ, σ): those of SE(3), then the logarithm of the scale.
+//! `s_a_b` maps points of frame b, in the unit of b, into frame a and its unit: x ↦ s R x + t. With a scale of exactly 1, results have the
+//! same bits as those of the rigid motion. Tangent vectors are ordered (ρ, φ, σ): the tangent vector of SE(3), then the logarithm of the
+//! scale.
 
 use nalgebra::{
     Isometry3, Matrix3, Matrix4, Point3, Quaternion, SMatrix, SVector, SymmetricEigen, UnitQuaternion, Vector3,
@@ -10,54 +11,56 @@ use nalgebra::{
 
 use super::{Pose, se3_exp, se3_log, skew};
 
-/// A similarity; `s_a_b` maps points given in frame b into frame a.
+/// A similarity; `s_a_b` maps points of frame b into frame a.
 pub(crate) type Similarity = nalgebra::Similarity3<f64>;
-/// A small similarity: (ρ, φ, σ).
+/// A tangent vector of Sim(3): (ρ, φ, σ).
 pub(crate) type Tangent = SVector<f64, 7>;
-/// A linear map of small similarities.
+/// A linear map of tangent vectors of Sim(3).
 pub(crate) type TangentMap = SMatrix<f64, 7, 7>;
 
-/// Least difference of the two largest eigenvalues, as a share of the largest, that fixes a rotation: points on a line leave it open.
+/// Least difference of the two largest eigenvalues, as a share of the largest, for which the rotation is unique; points on a line have
+/// no unique rotation.
 const MIN_GAP: f64 = 1e-6;
-/// Largest logarithm of a scale: anything beyond is nonsense, but must not become zero or infinite.
+/// Largest logarithm of a scale: the limit keeps scales finite and positive.
 const MAX_LOG_SCALE: f64 = 50.0;
 
-/// A rigid motion as a similarity whose scale is 1.
+/// Returns a rigid motion as a similarity with scale 1.
 pub(crate) fn unscaled(pose: &Pose) -> Similarity {
     Similarity::from_isometry(*pose, 1.0)
 }
 
-/// The camera pose whose picture of the world is that of `s_cam_world`, in the unit of the world: a picture has no scale.
+/// Returns the camera pose with the same projections as `s_cam_world`, in the unit of the world; projections do not depend on the scale.
 pub(crate) fn rigid(s_cam_world: &Similarity) -> Pose {
     let Isometry3 { rotation, translation } = s_cam_world.isometry;
     Pose::from_parts((translation.vector / s_cam_world.scaling()).into(), rotation)
 }
 
-/// The inverse of [`rigid`]: the camera pose `t_cam_world` with the camera's side in a unit of which one unit of the world has `scale`.
+/// Returns the similarity `s_cam_world` of a camera pose; `scale` is the size of the unit of the world in the unit of the camera. Inverts
+/// [`rigid`].
 pub(crate) fn with_scale(t_cam_world: &Pose, scale: f64) -> Similarity {
     let translation = (t_cam_world.translation.vector * scale).into();
     Similarity::from_isometry(Pose::from_parts(translation, t_cam_world.rotation), scale)
 }
 
-/// The similarity near the identity with these coordinates. It agrees with the exponential map to first order, and where σ is 0 in all.
+/// Returns the similarity with these tangent coordinates. It agrees with the exponential map to first order, and exactly if σ is 0.
 pub(crate) fn sim3_from_tangent(xi: &Tangent) -> Similarity {
     let scale = xi[6].clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE).exp();
     Similarity::from_isometry(se3_exp(&xi.fixed_rows::<6>(0).into_owned()), scale)
 }
 
-/// The coordinates of a similarity near the identity, the inverse of [`sim3_from_tangent`].
+/// Returns the tangent coordinates of a similarity: the inverse of [`sim3_from_tangent`].
 pub(crate) fn sim3_tangent(s: &Similarity) -> Tangent {
     se3_log(&s.isometry).push(s.scaling().ln())
 }
 
-/// A similarity after a left perturbation, with its quaternion brought back to unit length as in [`super::perturbed`].
+/// Returns a similarity after a left perturbation, with its quaternion normalised as in [`super::perturbed`].
 pub(crate) fn sim3_perturbed(xi: &Tangent, s: &Similarity) -> Similarity {
     let mut moved = sim3_from_tangent(xi) * s;
     moved.isometry.rotation.renormalize();
     moved
 }
 
-/// The adjoint of a similarity: `S exp(ξ) S⁻¹ = exp(Ad(S) ξ)`.
+/// Computes the adjoint of a similarity: `S exp(ξ) S⁻¹ = exp(Ad(S) ξ)`.
 pub(crate) fn sim3_adjoint(s: &Similarity) -> TangentMap {
     let rotation = *s.isometry.rotation.to_rotation_matrix().matrix();
     let translation = s.isometry.translation.vector;
@@ -70,9 +73,9 @@ pub(crate) fn sim3_adjoint(s: &Similarity) -> TangentMap {
     ad
 }
 
-/// The similarity that brings the first point of each pair nearest to the second (Horn, Closed-form solution of absolute orientation using
-/// unit quaternions, JOSA A 1987; the scale is the symmetrical one of section 2.D, for both sides have errors). `None` for fewer
-/// than three pairs and for points on a line, which leave it open.
+/// Estimates the similarity that maps the first point of each pair to the second with the least squared error (Horn, Closed-form solution
+/// of absolute orientation using unit quaternions, JOSA A 1987; with the symmetric scale of section 2.D, because both sides have errors).
+/// `None` for fewer than three pairs and for points on a line.
 pub(crate) fn absolute_orientation(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Similarity> {
     let count = pairs.len() as f64;
     let sum = pairs.iter().fold([Vector3::zeros(); 2], |[p, q], pair| [p + pair.0.coords, q + pair.1.coords]);
@@ -89,8 +92,8 @@ pub(crate) fn absolute_orientation(pairs: &[(Point3<f64>, Point3<f64>)]) -> Opti
     Some(Similarity::from_parts(translation.into(), rotation, scale))
 }
 
-/// The rotation for which the sum over all pairs of the second point's product with the first one, rotated, is largest: the eigenvector of
-/// the largest eigenvalue of Horn's N, made from the sums of products M.
+/// Returns the rotation that maximises the sum of the scalar products of each second point and the rotated first point: the eigenvector
+/// of the largest eigenvalue of Horn's matrix N, which is made from the sums of products M.
 fn horn_rotation(m: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let twist = Vector3::new(m.m23 - m.m32, m.m31 - m.m13, m.m12 - m.m21);
     let mut n = Matrix4::zeros();
@@ -104,7 +107,7 @@ fn horn_rotation(m: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let [largest, next] = [order[0], order[1]].map(|i| eigen.eigenvalues[i]);
     let q = eigen.eigenvectors.column(order[0]);
     let rotation = UnitQuaternion::try_new(Quaternion::new(q[0], q[1], q[2], q[3]), 1e-9);
-    // A comparison with NaN is false: what is no number has no gap.
+    // A comparison with NaN is false, so that NaN eigenvalues give no rotation.
     rotation.filter(|_| largest > 0.0 && largest - next > MIN_GAP * largest)
 }
 
@@ -123,12 +126,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn coordinates_are_those_that_a_similarity_was_made_from(v in prop::array::uniform7(-1.5f64..1.5)) {
+        fn tangent_coordinates_are_recovered(v in prop::array::uniform7(-1.5f64..1.5)) {
             prop_assert!((sim3_tangent(&similarity(&v)) - Tangent::from_row_slice(&v)).norm() < 1e-9);
         }
 
         #[test]
-        fn a_camera_sees_the_same_through_its_rigid_pose(v in prop::array::uniform7(-1.5f64..1.5), p in prop::array::uniform3(-3.0f64..3.0)) {
+        fn the_rigid_pose_has_the_same_projections(v in prop::array::uniform7(-1.5f64..1.5), p in prop::array::uniform3(-3.0f64..3.0)) {
             let s = similarity(&v);
             let (scaled, plain) = (s * point(p), rigid(&s) * point(p));
             prop_assert!((scaled.coords - plain.coords * s.scaling()).norm() < 1e-9);
@@ -137,7 +140,7 @@ mod tests {
         }
 
         #[test]
-        fn without_scale_it_is_the_rigid_motion_to_the_bit(v in prop::array::uniform6(-1.5f64..1.5), w in prop::array::uniform6(-1.5f64..1.5), p in prop::array::uniform3(-3.0f64..3.0)) {
+        fn with_scale_one_results_have_the_bits_of_the_rigid_motion(v in prop::array::uniform6(-1.5f64..1.5), w in prop::array::uniform6(-1.5f64..1.5), p in prop::array::uniform3(-3.0f64..3.0)) {
             let [a, b] = [v, w].map(|v| se3_exp(&SVector::<f64, 6>::from_row_slice(&v)));
             let (s_a, s_b) = (unscaled(&a), unscaled(&b));
             prop_assert_eq!(rigid(&(s_a * s_b)), a * b);
@@ -148,10 +151,10 @@ mod tests {
         }
 
         #[test]
-        fn the_adjoint_carries_a_perturbation_to_the_other_side(v in prop::array::uniform7(-1.0f64..1.0), w in prop::array::uniform7(-1.0f64..1.0)) {
+        fn the_adjoint_moves_a_perturbation_to_the_other_side(v in prop::array::uniform7(-1.0f64..1.0), w in prop::array::uniform7(-1.0f64..1.0)) {
             let (s, xi) = (similarity(&v), Tangent::from_row_slice(&w) * 1e-6);
-            let carried = sim3_tangent(&(s * sim3_from_tangent(&xi) * s.inverse()));
-            prop_assert!((carried - sim3_adjoint(&s) * xi).norm() < 1e-10);
+            let moved = sim3_tangent(&(s * sim3_from_tangent(&xi) * s.inverse()));
+            prop_assert!((moved - sim3_adjoint(&s) * xi).norm() < 1e-10);
         }
 
         #[test]
@@ -170,7 +173,7 @@ mod tests {
         }
 
         #[test]
-        fn points_on_a_line_or_in_one_place_are_refused(
+        fn points_on_a_line_and_coinciding_points_are_refused(
             v in prop::array::uniform7(-1.5f64..1.5),
             direction in prop::array::uniform3(-1.0f64..1.0),
             at in prop::collection::vec(-2.0f64..2.0, 0..8),
@@ -179,13 +182,13 @@ mod tests {
             let on_line = |t: &f64| Point3::new(0.3, -0.2, 2.0) + Vector3::from(direction) * *t;
             let pairs: Vec<_> = at.iter().map(|t| (on_line(t), s * on_line(t))).collect();
             prop_assert!(absolute_orientation(&pairs).is_none());
-            let here = [(point(direction), s * point(direction)); 4];
-            prop_assert!(absolute_orientation(&here).is_none());
+            let coinciding = [(point(direction), s * point(direction)); 4];
+            prop_assert!(absolute_orientation(&coinciding).is_none());
         }
     }
 
     #[test]
-    fn two_pairs_and_numbers_that_are_none_are_refused() {
+    fn two_pairs_and_nan_are_refused() {
         let p = [Point3::new(0.0, 0.0, 1.0), Point3::new(1.0, 0.0, 1.0), Point3::new(0.0, 1.0, 1.0)];
         let pairs = p.map(|p| (p, p));
         assert!(absolute_orientation(&pairs[..2]).is_none() && absolute_orientation(&[]).is_none());

@@ -1,8 +1,10 @@
-//! A point from two rays.
+//! Triangulation of a point from two rays (midpoint method).
+//!
+//! In: origins and directions of two rays. Out: the point nearest to both.
 
 use nalgebra::{Point3, Vector3};
 
-/// The point midway between two rays where they are nearest to each other; `None` if they do not approach in front of their origins.
+/// Returns the midpoint of the shortest segment between two rays; `None` for parallel rays and if it lies behind an origin.
 pub(crate) fn midpoint(
     center_a: &Vector3<f64>,
     ray_a: &Vector3<f64>,
@@ -30,6 +32,6 @@ mod tests {
         let (a, b) = (Vector3::zeros(), Vector3::new(0.5, 0.1, 0.0));
         let found = midpoint(&a, &((p - a) * 0.7), &b, &((p - b) * 0.4));
         assert!(found.is_some_and(|q| (q.coords - p).norm() < 1e-12));
-        assert!(midpoint(&a, &p, &b, &p).is_none(), "parallel rays meet nowhere");
+        assert!(midpoint(&a, &p, &b, &p).is_none(), "parallel rays do not intersect");
     }
 }

@@ -1,6 +1,6 @@
-//! Gaussian blur before descriptors are read.
+//! Gaussian blur before descriptors are computed.
 //!
-//! In: a grey image. Out: the same size, smoothed by 7 × 7, σ = 2 px (ORB-SLAM2, IEEE T-RO 2017, section III).
+//! In: a grey image. Out: the image smoothed by a Gaussian of 7 × 7 px, σ = 2 px (ORB-SLAM2, IEEE T-RO 2017, section III).
 
 use fearless_simd::{Level, dispatch, prelude::*};
 
@@ -10,10 +10,10 @@ use super::plane::{LANES, Plane};
 /// Half the kernel's width, px.
 pub(crate) const BLUR_RADIUS: usize = 3;
 
-/// Centre and one side of the symmetric kernel exp(−i²/2σ²), σ = 2 px, in 1/256; all seven sum to 256.
+/// Centre and one side of the symmetric kernel exp(−i²/2σ²), σ = 2 px, in 1/256; the seven weights sum to 256.
 const KERNEL: [u16; 4] = [56, 49, 33, 18];
 
-/// Blurs `src` into `dst`, which takes its size; the outermost [`BLUR_RADIUS`] pixels on each side stay unspecified.
+/// Blurs `src` into `dst`, which is resized to it; the outermost [`BLUR_RADIUS`] pixels on each side are unspecified.
 ///
 /// `line` is a buffer for one row.
 pub(crate) fn blur(level: Level, src: &Plane, dst: &mut Plane, line: &mut Vec<u8>) {
@@ -47,7 +47,7 @@ mod tests {
     use super::super::plane::tests::images;
     use super::*;
 
-    /// The same arithmetic, pixel by pixel: columns first, rounded, then rows.
+    /// Blurs one pixel with the same arithmetic: columns first, rounded, then rows.
     fn blurred(src: &Plane, x: usize, y: usize) -> u8 {
         let weighted = |v: &dyn Fn(usize) -> u8| {
             let sum: u32 = (0..7).map(|i| u32::from(KERNEL[BLUR_RADIUS.abs_diff(i)]) * u32::from(v(i))).sum();

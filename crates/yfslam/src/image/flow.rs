@@ -1,6 +1,6 @@
 //! Sparse optical flow (Lucas and Kanade 1981; pyramidal form by Bouguet, Intel 2001).
 //!
-//! In: two pictures in a row, a position in the first. Out: the position in the second.
+//! In: two consecutive grey images and a position in the first. Out: the corresponding position in the second.
 
 use fearless_simd::Level;
 
@@ -8,18 +8,18 @@ use super::{GrayImage, Plane, Pyramid};
 
 /// Pyramid levels, each half as large as the one before. Source of the constants: DS-SLAM.
 const LEVELS: usize = 5;
-/// Half the side of the window, px: 21 of them make the nearest odd one to DS-SLAM's 22.
+/// Half the side of the window, px: a side of 21 px is the odd number nearest to DS-SLAM's 22.
 const HALF: usize = 10;
 const SIDE: usize = 2 * HALF + 1;
-/// The window with room for gradients.
+/// Side of the window with one more pixel on each side, for the gradients, px.
 const OUTER: usize = SIDE + 2;
 const ITERATIONS: usize = 20;
-/// Step at which a position stands, px.
+/// Length of a step at which the iteration has converged, px.
 const EPSILON_PX: f32 = 0.01;
-/// Least eigenvalue of the structure tensor per pixel below which a window has no texture.
+/// Smaller eigenvalue of the structure tensor, per pixel, below which a window has too little texture.
 const MIN_EIGENVALUE: f32 = 1e-4 * 255.0 * 255.0 / 16.0;
 
-/// Follows positions from the last picture into the one that was pushed. Buffers are reused.
+/// Pyramids of the last two images, for tracking positions from one to the other. Buffers are reused.
 #[derive(Clone, Debug)]
 pub(crate) struct Flow {
     last: Pyramid,
@@ -34,13 +34,13 @@ impl Default for Flow {
 }
 
 impl Flow {
-    /// Takes the next picture in; the one before becomes the last.
+    /// Adds the next image; the current one becomes the last.
     pub(crate) fn push(&mut self, image: &GrayImage) {
         std::mem::swap(&mut self.last, &mut self.current);
         self.current.build(image);
     }
 
-    /// Where a position of the last picture, px, lies in the current one; `None` if it was lost: no texture, or out of the picture.
+    /// Estimates where a position of the last image, px, lies in the current one; `None` without texture or outside the image.
     pub(crate) fn follow(&self, [x, y]: [f32; 2]) -> Option<[f32; 2]> {
         let pairs = self.last.planes().iter().zip(self.current.planes());
         let (mut dx, mut dy) = (0.0f32, 0.0f32);
@@ -48,9 +48,9 @@ impl Flow {
             let scale = (1u32 << level) as f32;
             let at = |v: f32| (v + 0.5) / scale - 0.5;
             (dx, dy) = (2.0 * dx, 2.0 * dy);
-            match step(last, current, [at(x), at(y)], [dx, dy]) {
+            match refine_on_level(last, current, [at(x), at(y)], [dx, dy]) {
                 Some(moved) => [dx, dy] = moved,
-                // A coarse level may be too small for the window; the finest decides.
+                // A coarse level may be too small for the window; only a failure on the finest level counts.
                 None if level > 0 => {}
                 None => return None,
             }
@@ -58,7 +58,7 @@ impl Flow {
         Some([x + dx, y + dy])
     }
 
-    /// Sum of absolute differences of the 3 × 3 px around a position of the last picture and one of the current.
+    /// Returns the sum of absolute differences of the 3 × 3 px around a position of the last image and one of the current image.
     pub(crate) fn difference(&self, from: [f32; 2], to: [f32; 2]) -> Option<f32> {
         let (last, current) = (self.last.planes().first()?, self.current.planes().first()?);
         let (mut a, mut b) = ([0.0; 9], [0.0; 9]);
@@ -67,8 +67,8 @@ impl Flow {
     }
 }
 
-/// The displacement on one level, from a first guess.
-fn step(last: &Plane, current: &Plane, [x, y]: [f32; 2], [mut dx, mut dy]: [f32; 2]) -> Option<[f32; 2]> {
+/// Refines the displacement on one level; `None` without texture or outside the image.
+fn refine_on_level(last: &Plane, current: &Plane, [x, y]: [f32; 2], [mut dx, mut dy]: [f32; 2]) -> Option<[f32; 2]> {
     let mut outer = [0.0f32; OUTER * OUTER];
     if !sample::<OUTER>(last, [x, y], &mut outer) {
         return None;
@@ -91,14 +91,14 @@ fn step(last: &Plane, current: &Plane, [x, y]: [f32; 2], [mut dx, mut dy]: [f32;
         return None;
     }
     let determinant = xx * yy - xy * xy;
-    let mut seen = [0.0f32; SIDE * SIDE];
+    let mut moved = [0.0f32; SIDE * SIDE];
     for _ in 0..ITERATIONS {
-        if !sample::<SIDE>(current, [x + dx, y + dy], &mut seen) {
+        if !sample::<SIDE>(current, [x + dx, y + dy], &mut moved) {
             return None;
         }
         let (mut bx, mut by) = (0.0, 0.0);
         for i in 0..SIDE * SIDE {
-            let error = patch[i] - seen[i];
+            let error = patch[i] - moved[i];
             bx += gx[i] * error;
             by += gy[i] * error;
         }
@@ -111,7 +111,7 @@ fn step(last: &Plane, current: &Plane, [x, y]: [f32; 2], [mut dx, mut dy]: [f32;
     (dx.is_finite() && dy.is_finite()).then_some([dx, dy])
 }
 
-/// `N` × `N` pixels around a position, interpolated. Returns whether all lie in the picture.
+/// Interpolates the `N` × `N` pixels around a position. Returns false if any of them lies outside the image.
 fn sample<const N: usize>(plane: &Plane, [x, y]: [f32; 2], out: &mut [f32]) -> bool {
     let (left, top) = (x - (N / 2) as f32, y - (N / 2) as f32);
     let inside = left >= 0.0
@@ -141,8 +141,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A smooth pattern, moved.
-    fn picture(dx: f32, dy: f32) -> GrayImage {
+    /// Returns an image of a smooth pattern shifted by (dx, dy) px.
+    fn shifted_image(dx: f32, dy: f32) -> GrayImage {
         let value = |i: usize| {
             let (x, y) = ((i % 320) as f32 - dx, (i / 320) as f32 - dy);
             let waves = (x * 0.11).sin() + (y * 0.13).sin() + (x * 0.05 + y * 0.07).cos() + (x * 0.02 - y * 0.03).sin();
@@ -154,10 +154,10 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
         #[test]
-        fn a_moved_picture_is_followed(dx in -9f32..9.0, dy in -9f32..9.0, x in 60f32..260.0, y in 60f32..180.0) {
+        fn a_shifted_image_is_tracked(dx in -9f32..9.0, dy in -9f32..9.0, x in 60f32..260.0, y in 60f32..180.0) {
             let mut flow = Flow::default();
-            flow.push(&picture(0.0, 0.0));
-            flow.push(&picture(dx, dy));
+            flow.push(&shifted_image(0.0, 0.0));
+            flow.push(&shifted_image(dx, dy));
             let [u, v] = flow.follow([x, y]).unwrap();
             prop_assert!((u - x - dx).abs() < 0.15 && (v - y - dy).abs() < 0.15, "{u} {v} for {dx} {dy}");
             prop_assert!(flow.difference([x, y], [u, v]).unwrap() < 30.0);
@@ -165,14 +165,14 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_texture_or_lies_at_the_border_is_not_followed() {
+    fn positions_without_texture_or_at_the_border_are_not_tracked() {
         let mut flow = Flow::default();
         let blank = GrayImage::new(320, 240);
         flow.push(&blank);
         flow.push(&blank);
         assert_eq!(flow.follow([160.0, 120.0]), None);
-        flow.push(&picture(0.0, 0.0));
-        flow.push(&picture(0.0, 0.0));
+        flow.push(&shifted_image(0.0, 0.0));
+        flow.push(&shifted_image(0.0, 0.0));
         assert_eq!(flow.follow([2.0, 120.0]), None);
     }
 }

@@ -1,34 +1,34 @@
 //! Images from the buffers of other libraries.
 //!
-//! In: pixels row by row with a stride, as cameras, ROS and OpenCV give them. Out: packed images, or an error that names the numbers.
+//! In: rows of pixels with a stride, as cameras, ROS and OpenCV deliver them. Out: packed images, or an error that names the sizes.
 
 use super::{DepthImage, Image, RgbImage};
 
-/// Unit of depth images made of floating-point depth, m: finer than the noise of any sensor, and up to 32 m.
+/// Unit of depth images converted from floating-point depth, m: finer than the noise of any sensor, with a range of 32 m.
 const FLOAT_UNIT_M: f32 = 0.0005;
 
-/// Why a buffer is no image of the given size.
+/// Reason why a buffer is not an image of the given size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
     /// A row is longer than the stride.
     #[error(
-        "the stride is {stride}, but a row of {width} pixels has {needed} elements: give the elements from one row to the next"
+        "the stride is {stride}, but a row of {width} pixels has {needed} elements: pass the number of elements from one row to the next"
     )]
     Stride {
         /// Elements from one row to the next.
         stride: usize,
         /// Pixels per row.
         width: usize,
-        /// Elements that a row needs.
+        /// Elements that a row has.
         needed: usize,
     },
     /// The buffer is too short.
     #[error(
-        "the buffer has {found} elements, but {width}×{height} pixels with this stride need {needed}: check size and stride"
+        "the buffer has {found} elements, but {width}×{height} pixels with this stride need {needed}: check the size and the stride"
     )]
     Length {
-        /// Elements found.
+        /// Elements of the buffer.
         found: usize,
         /// Elements needed.
         needed: usize,
@@ -37,8 +37,8 @@ pub enum ImageError {
         /// Rows.
         height: usize,
     },
-    /// The depth unit is no positive length.
-    #[error("a depth unit of {0} µm is no positive length: give metres per unit, such as 0.001 for millimetres")]
+    /// The depth unit is not a positive length; the value is in µm.
+    #[error("the depth unit is {0} µm, but it must be positive: pass metres per unit, such as 0.001 for millimetres")]
     Unit(i64),
 }
 
@@ -46,7 +46,7 @@ impl RgbImage {
     /// Copies an 8-bit image with channels red, green, blue; `stride` is the number of bytes from one row to the next.
     ///
     /// # Errors
-    /// If the stride is shorter than a row or the buffer shorter than the image.
+    /// If the stride is shorter than a row, or the buffer is shorter than the image.
     pub fn from_rgb8(data: &[u8], width: usize, height: usize, stride: usize) -> Result<Self, ImageError> {
         packed(data, [width, height, stride], |[r, g, b]: &[u8; 3]| [*r, *g, *b])
     }
@@ -54,7 +54,7 @@ impl RgbImage {
     /// Copies an 8-bit image with channels blue, green, red (OpenCV); `stride` is the number of bytes from one row to the next.
     ///
     /// # Errors
-    /// If the stride is shorter than a row or the buffer shorter than the image.
+    /// If the stride is shorter than a row, or the buffer is shorter than the image.
     pub fn from_bgr8(data: &[u8], width: usize, height: usize, stride: usize) -> Result<Self, ImageError> {
         packed(data, [width, height, stride], |[b, g, r]: &[u8; 3]| [*r, *g, *b])
     }
@@ -62,18 +62,18 @@ impl RgbImage {
     /// Copies an 8-bit grey image into all three channels; `stride` is the number of bytes from one row to the next.
     ///
     /// # Errors
-    /// If the stride is shorter than a row or the buffer shorter than the image.
+    /// If the stride is shorter than a row, or the buffer is shorter than the image.
     pub fn from_gray8(data: &[u8], width: usize, height: usize, stride: usize) -> Result<Self, ImageError> {
         packed(data, [width, height, stride], |[gray]: &[u8; 1]| [*gray; 3])
     }
 }
 
 impl DepthImage {
-    /// Copies a 16-bit depth image, 0 where nothing was measured; `stride` is the number of values from one row to the next,
-    /// `metres_per_unit` the unit, such as 0.001 for millimetres and 1/5000 for TUM recordings.
+    /// Copies a 16-bit depth image; 0 means that nothing was measured. `stride` is the number of values from one row to the next.
+    /// `metres_per_unit` is the unit, such as 0.001 for millimetres and 1/5000 for TUM recordings.
     ///
     /// # Errors
-    /// If the stride is shorter than a row, the buffer shorter than the image, or the unit no positive length.
+    /// If the stride is shorter than a row, the buffer is shorter than the image, or the unit is not positive and finite.
     pub fn from_u16(
         data: &[u16],
         width: usize,
@@ -88,21 +88,21 @@ impl DepthImage {
         Ok(Self { raw, metres_per_unit })
     }
 
-    /// Copies a depth image in metres; NaN, infinite, zero and negative values mean that nothing was measured, and so do depths beyond
-    /// 32 m. Depth is rounded to half a millimetre. `stride` is the number of values from one row to the next.
+    /// Copies a depth image in metres. NaN, infinite, zero and negative values and depths beyond 32 m become "not measured". Depths are
+    /// rounded to half a millimetre. `stride` is the number of values from one row to the next.
     ///
     /// # Errors
-    /// If the stride is shorter than a row or the buffer shorter than the image.
+    /// If the stride is shorter than a row, or the buffer is shorter than the image.
     pub fn from_f32(data: &[f32], width: usize, height: usize, stride: usize) -> Result<Self, ImageError> {
-        let unit = |[depth_m]: &[f32; 1]| {
+        let to_units = |[depth_m]: &[f32; 1]| {
             let steps = depth_m / FLOAT_UNIT_M + 0.5;
             if steps >= 1.0 && steps <= f32::from(u16::MAX) { steps as u16 } else { 0 }
         };
-        Ok(Self { raw: packed(data, [width, height, stride], unit)?, metres_per_unit: FLOAT_UNIT_M })
+        Ok(Self { raw: packed(data, [width, height, stride], to_units)?, metres_per_unit: FLOAT_UNIT_M })
     }
 }
 
-/// Copies the pixels of `N` elements each, without the padding at the ends of rows.
+/// Copies pixels of `N` elements each and leaves out the padding at the ends of the rows.
 fn packed<S, T: Copy + Default, const N: usize>(
     data: &[S],
     [width, height, stride]: [usize; 3],
@@ -112,7 +112,7 @@ fn packed<S, T: Copy + Default, const N: usize>(
     if stride < needed {
         return Err(ImageError::Stride { stride, width, needed });
     }
-    // The last row needs no padding.
+    // The buffer may end without the padding of the last row.
     let length = height.checked_sub(1).map_or(0, |rows| rows.saturating_mul(stride).saturating_add(needed));
     if data.len() < length {
         return Err(ImageError::Length { found: data.len(), needed: length, width, height });
@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strides_are_skipped_and_channels_ordered() {
+    fn padding_is_skipped_and_channels_are_ordered() {
         let bytes: Vec<u8> = (0..14).collect();
         let rgb = RgbImage::from_rgb8(&bytes, 2, 2, 8).unwrap();
         assert_eq!(rgb.data(), [[0, 1, 2], [3, 4, 5], [8, 9, 10], [11, 12, 13]]);
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_buffers_are_refused_with_the_numbers() {
+    fn wrong_buffers_are_refused_with_their_sizes() {
         let short = RgbImage::from_rgb8(&[0; 11], 2, 2, 6).unwrap_err();
         assert_eq!(short, ImageError::Length { found: 11, needed: 12, width: 2, height: 2 });
         let stride = RgbImage::from_rgb8(&[0; 12], 2, 2, 5).unwrap_err();

@@ -1,4 +1,4 @@
-//! Colour to grey.
+//! Conversion from colour to grey.
 //!
 //! In: 8-bit RGB. Out: 8-bit luma (ITU-R BT.601: 0.299 R + 0.587 G + 0.114 B, in 1/256).
 
@@ -7,10 +7,10 @@ use fearless_simd::{Level, dispatch, prelude::*};
 use super::kernels::{even, high_bytes, load, odd, store};
 use super::{GrayImage, RgbImage};
 
-/// Weights of red, green, blue in 1/256; they sum to 256, so that white stays white.
+/// Weights of red, green and blue in 1/256; their sum is 256, so that white stays white.
 const BT601: [u16; 3] = [77, 150, 29];
 
-/// Converts `rgb` to grey; `out` takes its size.
+/// Converts `rgb` to grey; `out` is resized to it.
 pub fn gray_from_rgb(rgb: &RgbImage, out: &mut GrayImage) {
     out.resize(rgb.width(), rgb.height());
     convert(Level::new(), rgb.data(), out.data_mut());
@@ -20,7 +20,7 @@ fn convert(level: Level, rgb: &[[u8; 3]], gray: &mut [u8]) {
     dispatch!(level, simd => convert_blocks(simd, rgb, gray));
 }
 
-/// Rounded weighted mean; the sum stays below 2^16.
+/// Returns the rounded weighted mean; the sum stays below 2^16.
 fn luma(&[r, g, b]: &[u8; 3]) -> u8 {
     ((BT601[0] * u16::from(r) + BT601[1] * u16::from(g) + BT601[2] * u16::from(b) + 128) >> 8) as u8
 }
@@ -28,7 +28,8 @@ fn luma(&[r, g, b]: &[u8; 3]) -> u8 {
 #[inline(always)]
 fn convert_blocks<S: Simd>(simd: S, rgb: &[[u8; 3]], gray: &mut [u8]) {
     let lanes = S::u8s::LEN;
-    // Byte i of a channel is byte 3·i + channel of three vectors: two are looked up together, then what is found and the third.
+    // Byte i of a channel is byte 3·i + channel of three vectors. A table look-up takes two vectors: the first two are combined, then
+    // the result with the third.
     let mut first = [S::u8s::splat(simd, 0); 3];
     let mut second = first;
     for channel in 0..3 {
@@ -82,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn grey_pixels_stay_what_they_are() {
+    fn grey_pixels_keep_their_value() {
         for value in 0..=255 {
             assert_eq!(luma(&[value; 3]), value);
         }

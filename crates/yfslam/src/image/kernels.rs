@@ -1,23 +1,23 @@
-//! Pixel arithmetic in vectors, the same bits at every SIMD level.
+//! Pixel arithmetic in SIMD vectors, with the same bits at every SIMD level.
 //!
-//! In: rows of bytes. Out: rows of bytes. Weights are in 1/256 and results are rounded into the high byte of a 16-bit lane; even
-//! and odd bytes are therefore computed apart, without any shuffle.
+//! In: rows of bytes. Out: rows of bytes. Weights are in 1/256 and results are rounded into the high byte of a 16-bit lane. Even and
+//! odd bytes are therefore computed separately, which needs no shuffle.
 
 use fearless_simd::prelude::*;
 
-/// The bytes of `v` at even positions as 16-bit lanes.
+/// Returns the bytes of `v` at even positions as 16-bit lanes.
 #[inline(always)]
 pub(crate) fn even<S: Simd>(v: S::u8s) -> S::u16s {
     v.bitcast::<S::u16s>() & 0x00ff
 }
 
-/// The bytes of `v` at odd positions as 16-bit lanes.
+/// Returns the bytes of `v` at odd positions as 16-bit lanes.
 #[inline(always)]
 pub(crate) fn odd<S: Simd>(v: S::u8s) -> S::u16s {
     v.bitcast::<S::u16s>() >> 8
 }
 
-/// The high bytes of `even` and `odd`, interleaved.
+/// Interleaves the high bytes of `even` and `odd`.
 #[inline(always)]
 pub(crate) fn high_bytes<S: Simd>(even: S::u16s, odd: S::u16s) -> S::u8s {
     ((even >> 8) | (odd & 0xff00)).bitcast::<S::u8s>()
@@ -35,9 +35,9 @@ pub(crate) fn store<S: Simd>(slice: &mut [u8], at: usize, v: S::u8s) {
     v.store_slice(&mut slice[at..at + S::u8s::LEN]);
 }
 
-/// Rounded weighted mean `a + (b − a) · weight`; `weight` of the even and odd bytes of `b` in 1/256, below 256.
+/// Returns the rounded weighted mean `a + (b − a) · weight`, with the weights of the even and odd bytes of `b` in 1/256, below 256.
 ///
-/// The exact sum lies in 0..2^16, so that wrapping on the way does no harm.
+/// The exact sum lies in 0..2^16, so that wrapping in intermediate results cancels.
 #[inline(always)]
 pub(crate) fn lerp<S: Simd>(a: S::u8s, b: S::u8s, weight: (S::u16s, S::u16s)) -> S::u8s {
     let wide = a.bitcast::<S::u16s>();
@@ -46,7 +46,8 @@ pub(crate) fn lerp<S: Simd>(a: S::u8s, b: S::u8s, weight: (S::u16s, S::u16s)) ->
     high_bytes::<S>(even_sum, odd_sum)
 }
 
-/// Rounded sum of seven vectors, `stride` apart from `slice[at]` on, weighted symmetrically by `kernel` (centre first).
+/// Returns the rounded sum of seven vectors at distances of `stride`, the first at `slice[at]`, with the symmetric weights `kernel`
+/// (centre first).
 #[inline(always)]
 pub(crate) fn symmetric7<S: Simd>(simd: S, slice: &[u8], at: usize, stride: usize, kernel: [u16; 4]) -> S::u8s {
     let centre = load(simd, slice, at + 3 * stride);
@@ -64,7 +65,7 @@ pub(crate) fn symmetric7<S: Simd>(simd: S, slice: &[u8], at: usize, stride: usiz
 pub(crate) mod tests {
     use fearless_simd::{Level, Simd};
 
-    /// Every SIMD level this machine has, and the plain fallback.
+    /// Returns every SIMD level of this machine and the scalar fallback.
     pub(crate) fn levels() -> Vec<Level> {
         let best = Level::new();
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]

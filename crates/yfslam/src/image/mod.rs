@@ -1,4 +1,6 @@
-//! Image buffers: row-major, tightly packed, top row first.
+//! Image buffers (row-major, without padding, top row first) and the operations on them.
+//!
+//! In: raw buffers. Out: grey images, pyramids, blurred images, optical flow.
 
 mod blur;
 mod flow;
@@ -30,17 +32,17 @@ pub type GrayImage = Image<u8>;
 pub type RgbImage = Image<[u8; 3]>;
 
 impl<T: Copy + Default> Image<T> {
-    /// An image filled with `T::default()`.
+    /// Makes an image filled with `T::default()`.
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, data: vec![T::default(); width * height] }
     }
 
-    /// Takes over `data` (row-major); `None` unless it holds exactly `width * height` pixels.
+    /// Makes an image of `data` (row-major); `None` unless it holds exactly `width * height` pixels.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {
         (data.len() == width.checked_mul(height)?).then_some(Self { width, height, data })
     }
 
-    /// Changes the size, keeping the allocation where it suffices; pixel values are unspecified afterwards.
+    /// Changes the size and keeps the allocation if it is large enough; pixel values are unspecified afterwards.
     pub fn resize(&mut self, width: usize, height: usize) {
         self.width = width;
         self.height = height;
@@ -49,53 +51,53 @@ impl<T: Copy + Default> Image<T> {
 }
 
 impl<T> Image<T> {
-    /// Pixels per row.
+    /// Returns the number of pixels in a row.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// All pixels, row-major.
+    /// Returns all pixels, row-major.
     pub fn data(&self) -> &[T] {
         &self.data
     }
 
-    /// All pixels, row-major.
+    /// Returns all pixels, row-major, for writing.
     pub fn data_mut(&mut self) -> &mut [T] {
         &mut self.data
     }
 
-    /// Row `y`.
+    /// Returns row `y`.
     pub fn row(&self, y: usize) -> &[T] {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
-    /// Row `y`.
+    /// Returns row `y` for writing.
     pub fn row_mut(&mut self, y: usize) -> &mut [T] {
         &mut self.data[y * self.width..(y + 1) * self.width]
     }
 
-    /// The pixel at column `x`, row `y`, if inside.
+    /// Returns the pixel at column `x` and row `y`; `None` outside the image.
     pub fn get(&self, x: usize, y: usize) -> Option<&T> {
         (x < self.width && y < self.height).then(|| &self.data[y * self.width + x])
     }
 }
 
-/// A depth image in the sensor's own units; 0 means "not measured".
+/// A depth image in the units of the sensor.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DepthImage {
-    /// Depth along the optical axis in sensor units; 0 where nothing was measured.
+    /// Depth along the optical axis, in units of `metres_per_unit`; 0 where nothing was measured.
     pub raw: Image<u16>,
-    /// Metres per sensor unit, such as 1/5000 for TUM recordings.
+    /// Metres per unit, such as 1/5000 for TUM recordings.
     pub metres_per_unit: f32,
 }
 
 impl DepthImage {
-    /// Depth in metres at column `x`, row `y`; `None` outside the image or where nothing was measured.
+    /// Returns the depth in metres at column `x` and row `y`; `None` outside the image or where nothing was measured.
     pub fn metres(&self, x: usize, y: usize) -> Option<f32> {
         match self.raw.get(x, y) {
             Some(&raw) if raw > 0 => Some(f32::from(raw) * self.metres_per_unit),

@@ -1,13 +1,13 @@
-//! Grey images with room behind each row.
+//! Grey images with padding at the end of each row.
 //!
-//! In: a grey image. Out: a copy whose rows end in padding, so that kernels work in whole vectors and need no tail.
+//! In: a grey image. Out: a copy whose rows end in padding, so that kernels process whole vectors only.
 
 use super::GrayImage;
 
-/// The widest vector of any instruction set, in bytes; also the alignment of a row.
+/// Width of the widest vector of all instruction sets, bytes; also the granularity of the stride.
 pub(crate) const LANES: usize = 64;
 
-/// What a kernel may touch behind the last pixel of a row: one vector, shifted by the radius of a neighbourhood.
+/// Bytes that a kernel may access behind the last pixel of a row: one vector, shifted by the radius of a neighbourhood.
 const PADDING: usize = LANES + 8;
 
 /// An 8-bit image with padded rows; pixels in the padding are unspecified.
@@ -20,7 +20,7 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// Changes the size, keeping the allocation where it suffices; pixel values are unspecified afterwards.
+    /// Changes the size and keeps the allocation if it is large enough; pixel values are unspecified afterwards.
     pub(crate) fn resize(&mut self, width: usize, height: usize) {
         self.width = width;
         self.height = height;
@@ -28,7 +28,7 @@ impl Plane {
         self.data.resize(self.stride * height, 0);
     }
 
-    /// Becomes a copy of `image`.
+    /// Copies `image` and takes over its size.
     pub(crate) fn copy_from(&mut self, image: &GrayImage) {
         self.resize(image.width(), image.height());
         for (row, source) in
@@ -38,32 +38,32 @@ impl Plane {
         }
     }
 
-    /// Pixels per row, padding excluded.
+    /// Returns the number of pixels in a row without its padding.
     pub(crate) fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub(crate) fn height(&self) -> usize {
         self.height
     }
 
-    /// Distance between rows in `data`, px.
+    /// Returns the distance between rows in `data`, px.
     pub(crate) fn stride(&self) -> usize {
         self.stride
     }
 
-    /// All rows with their padding.
+    /// Returns all rows with their padding.
     pub(crate) fn data(&self) -> &[u8] {
         &self.data
     }
 
-    /// Row `y` with its padding.
+    /// Returns row `y` with its padding.
     pub(crate) fn row(&self, y: usize) -> &[u8] {
         &self.data[y * self.stride..(y + 1) * self.stride]
     }
 
-    /// Row `y` with its padding.
+    /// Returns row `y` with its padding, for writing.
     pub(crate) fn row_mut(&mut self, y: usize) -> &mut [u8] {
         &mut self.data[y * self.stride..(y + 1) * self.stride]
     }
@@ -84,7 +84,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// Images of any size in `sides`, from flat to noisy.
+    /// Generates images with sides in `sides`, from uniform to noisy.
     pub(crate) fn images(sides: std::ops::Range<usize>) -> impl Strategy<Value = GrayImage> {
         (sides.clone(), sides, 0u8..=255, 0u8..=255).prop_flat_map(|(width, height, a, b)| {
             proptest::collection::vec(a.min(b)..=a.max(b), width * height)

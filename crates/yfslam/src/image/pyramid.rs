@@ -1,6 +1,6 @@
 //! Image pyramid by bilinear resampling.
 //!
-//! In: a grey image. Out: the same image at scales 1, 1/s, 1/s², … Pixel areas are aligned: the centre of pixel `x` of
+//! In: a grey image. Out: the image at scales 1, 1/s, 1/s², … The areas of the pixels are aligned: the centre of pixel `x` of
 //! level `l` lies at `(x + 0.5) · s^l − 0.5` of level 0.
 
 use fearless_simd::{Level, dispatch, prelude::*};
@@ -9,19 +9,19 @@ use super::GrayImage;
 use super::kernels::{even, lerp, load, odd, store};
 use super::plane::{LANES, Plane};
 
-/// A stack of images, each a constant factor smaller than the one before; buffers are reused from frame to frame.
+/// A stack of images, each smaller than the one before by a constant factor. Buffers are reused from frame to frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Pyramid {
     level: Level,
     scale_factor: f32,
     planes: Vec<Plane>,
-    /// Column taps from plane `i` to plane `i + 1`.
+    /// Interpolation taps of the columns from plane `i` to plane `i + 1`.
     columns: Vec<Taps>,
     line: Vec<u8>,
 }
 
 impl Pyramid {
-    /// An empty pyramid of `planes` images (at least 1), each `scale_factor` (in 1–2) times smaller than the one before.
+    /// Makes an empty pyramid of `planes` images (at least 1), each smaller than the one before by `scale_factor` (1 to 2).
     pub(crate) fn new(level: Level, planes: usize, scale_factor: f32) -> Self {
         let planes = planes.max(1);
         Self {
@@ -33,7 +33,7 @@ impl Pyramid {
         }
     }
 
-    /// Fills all planes from `image`, which becomes the first.
+    /// Computes all planes from `image`, which becomes the first.
     pub(crate) fn build(&mut self, image: &GrayImage) {
         let Some((base, rest)) = self.planes.split_first_mut() else { return };
         base.copy_from(image);
@@ -47,27 +47,27 @@ impl Pyramid {
         }
     }
 
-    /// Ratio between the scales of neighbouring planes.
+    /// Returns the ratio between the scales of neighbouring planes.
     pub(crate) fn scale_factor(&self) -> f32 {
         self.scale_factor
     }
 
-    /// All planes, finest first.
+    /// Returns all planes, finest first.
     pub(crate) fn planes(&self) -> &[Plane] {
         &self.planes
     }
 }
 
-/// Side of the next smaller plane; bilinear resampling needs two pixels on each side.
+/// Returns the side of the next smaller plane; 0 if the input has fewer than the two pixels that bilinear resampling needs.
 fn smaller(len: usize, scale: f32) -> usize {
     if len < 2 { 0 } else { (len as f32 / scale).round() as usize }
 }
 
-/// Where each output pixel of a row lies between input pixels, in blocks of one vector.
+/// Positions of the output pixels of a row between the input pixels, in blocks of one vector.
 #[derive(Clone, Debug, Default)]
 struct Taps {
     input: usize,
-    /// First input pixel of each block.
+    /// First input pixel that each block uses.
     base: Vec<usize>,
     /// Left neighbour of each output pixel, relative to its block's base.
     left: Vec<u8>,
@@ -76,7 +76,7 @@ struct Taps {
 }
 
 impl Taps {
-    /// Computes the taps from `input` to `output` pixels in blocks of `lanes`, unless they stand already.
+    /// Computes the taps from `input` to `output` pixels in blocks of `lanes`, unless they are up to date.
     fn prepare(&mut self, scale: f32, input: usize, output: usize, lanes: usize) {
         let padded = output.next_multiple_of(lanes);
         if self.input == input && self.left.len() == padded {
@@ -98,14 +98,14 @@ impl Taps {
     }
 }
 
-/// Left neighbour of output pixel `i` among `len` (≥ 2) input pixels, and the weight of the right one in 1/256.
+/// Returns the left neighbour of output pixel `i` among `len` (≥ 2) input pixels, and the weight of the right neighbour in 1/256.
 fn tap(i: usize, scale: f32, len: usize) -> (usize, u8) {
     let position = ((i as f32 + 0.5) * scale - 0.5).clamp(0.0, (len - 1) as f32);
     let left = (position as usize).min(len - 2);
     (left, ((position - left as f32) * 256.0).round().min(255.0) as u8)
 }
 
-/// Bytes in the native vector.
+/// Returns the number of bytes in the native vector.
 fn lanes(level: Level) -> usize {
     #[inline(always)]
     fn of<S: Simd>(_: S) -> usize {
@@ -118,7 +118,7 @@ fn resample(level: Level, src: &Plane, scale: f32, columns: &Taps, dst: &mut Pla
     dispatch!(level, simd => resample_rows(simd, src, scale, columns, dst, line));
 }
 
-/// Blends two rows of `src` into `line`, then neighbours of `line` into a row of `dst`.
+/// Interpolates two rows of `src` into `line`, then neighbouring pixels of `line` into a row of `dst`.
 #[inline(always)]
 fn resample_rows<S: Simd>(simd: S, src: &Plane, scale: f32, columns: &Taps, dst: &mut Plane, line: &mut [u8]) {
     let lanes = S::u8s::LEN;
@@ -150,7 +150,7 @@ mod tests {
     use super::super::plane::tests::images;
     use super::*;
 
-    /// The same arithmetic, pixel by pixel: rows first, rounded, then columns.
+    /// Resamples one pixel with the same arithmetic: rows first, rounded, then columns.
     fn resampled(src: &Plane, scale: f32, x: usize, y: usize) -> u8 {
         let lerp = |a: u8, b: u8, weight: u8| {
             let weight = u32::from(weight);
@@ -179,7 +179,7 @@ mod tests {
         }
 
         #[test]
-        fn another_size_leaves_no_trace(first in images(0..90), second in images(0..90)) {
+        fn a_reused_pyramid_equals_a_fresh_one(first in images(0..90), second in images(0..90)) {
             let fresh = |image: &GrayImage| {
                 let mut pyramid = Pyramid::new(Level::new(), 4, 1.2);
                 pyramid.build(image);
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_keeps_its_place() {
+    fn a_ramp_keeps_its_position() {
         let ramp = GrayImage::from_vec(200, 4, (0..800).map(|i| (i % 200) as u8).collect()).unwrap();
         let mut pyramid = Pyramid::new(Level::new(), 8, 1.2);
         pyramid.build(&ramp);

@@ -43,7 +43,7 @@ pub(super) fn close(
     let s_far_near = s_cam_place.inverse() * k.t_cam_world;
     let is_one_map = map.root(keyframe) == map.root(candidate.keyframe);
     if !is_one_map {
-        map.weld(keyframe, candidate.keyframe, &s_far_near);
+        map.merge_submaps(keyframe, candidate.keyframe, &s_far_near);
     }
     // Once welded, both have the same unit.
     let s_cam_world = if is_one_map { *s_cam_place } else { unscaled(&rigid(s_cam_place)) };

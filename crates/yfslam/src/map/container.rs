@@ -1,16 +1,16 @@
-//! Records as bytes: a header that says what follows, then the records, compressed.
+//! The container of saved maps: sections, each with a header and compressed records.
 //!
 //! ```text
-//! kind · version u16 · length of the rest u64 · CRC-32 of the rest u32 │ zstd(postcard(records))
+//! magic · version u16 · length of the rest u64 · CRC-32 of the rest u32 │ zstd(postcard(records))
 //! ```
 //!
-//! Numbers of the header are little-endian. One kind may follow another: what `yfslam run --dense --save-map` writes is [`DENSE_MAP`], then
-//! [`MAP`]. In: records. Out: bytes, and back, checked. Nothing here touches files.
+//! Numbers of the header are little-endian. A file may have several sections: `yfslam run --dense --save-map` writes [`DENSE_MAP`], then
+//! [`MAP`]. In: records. Out: bytes; and the reverse, with checks. This module does not access files.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// What bytes hold: the words they begin with, and the version of the records that this code writes and reads.
+/// A type of section: its first bytes, and the version of the records that this program writes and reads.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Section {
     /// First bytes, such as "yfslam map".
@@ -19,65 +19,65 @@ pub(crate) struct Section {
     pub version: u16,
 }
 
-/// Keyframes and landmarks, by which a camera finds where it is.
+/// Section with the keyframes and landmarks, for localisation.
 pub(crate) const MAP: Section = Section { magic: "yfslam map", version: 1 };
-/// Pieces of a dense map, of which products are made.
+/// Section with the keyframe patches of a dense map.
 pub(crate) const DENSE_MAP: Section = Section { magic: "yfslam dense map", version: 3 };
 
-/// Why bytes cannot be used.
+/// Reason why bytes cannot be read as a saved map.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ContainerError {
-    /// The bytes begin like something else.
-    #[error("this is no {0}: it does not begin with \"{0}\"")]
+    /// The bytes do not begin with the expected magic words.
+    #[error("this is not a {0}: it does not begin with \"{0}\"; give a file that yfslam saved")]
     Foreign(&'static str),
-    /// Another version of the format.
+    /// The format has another version.
     #[error(
-        "the {magic} has version {found} of the format, this program reads version {version}: use the program that wrote it, or make it anew"
+        "the {magic} has version {found} of the format, but this program reads version {version}: use the program that wrote it, or create the map again"
     )]
     Version {
-        /// What was wanted.
+        /// Magic words of the expected section.
         magic: &'static str,
-        /// The version found.
+        /// Version of the bytes.
         found: u16,
-        /// The version that is read.
+        /// Version that this program reads.
         version: u16,
     },
-    /// Bytes are missing, or there are more than the header announces.
-    #[error("it is {found} bytes long, its header announces {announced}: it was cut or appended to; use another copy")]
+    /// There are fewer or more bytes than the header states.
+    #[error("it has {found} bytes, but its header states {announced}: it was truncated or extended; use another copy")]
     Length {
-        /// Bytes found.
+        /// Number of bytes.
         found: u64,
-        /// Bytes announced.
+        /// Number of bytes according to the header.
         announced: u64,
     },
-    /// The bytes were altered.
-    #[error("its checksum is {found:08x}, its header says {announced:08x}: it was altered; use another copy")]
+    /// The checksum does not match the bytes.
+    #[error("its checksum is {found:08x}, but its header states {announced:08x}: it was altered; use another copy")]
     Checksum {
         /// Checksum of the bytes.
         found: u32,
         /// Checksum in the header.
         announced: u32,
     },
-    /// A map without a dense one.
+    /// The file has a map but no dense map.
     #[error(
-        "it is a map to find a camera by, without surfaces: save it by a run with --dense, or give the output folder of such a run"
+        "it is a map for localisation without a dense map: save it in a run with --dense, or give the output folder of such a run"
     )]
     NoPieces,
-    /// The records contradict each other, or themselves.
+    /// The records are inconsistent.
     #[error("its records are wrong: {0}")]
     Records(String),
 }
 
 impl Section {
-    /// Bytes of the header.
+    /// Returns the length of the header, bytes.
     pub(crate) const fn header(self) -> usize {
         self.magic.len() + 2 + 8 + 4
     }
 
-    /// The records as bytes.
+    /// Serialises and compresses records.
     ///
     /// # Errors
-    /// If the records cannot be written, which would be a fault of this program.
+    /// If serialisation fails, which would be a fault of this program.
     pub(crate) fn pack(self, records: &impl Serialize) -> Result<Vec<u8>, ContainerError> {
         let plain = postcard::to_allocvec(records).map_err(|error| ContainerError::Records(error.to_string()))?;
         let packed = ruzstd::encoding::compress_to_vec(plain.as_slice(), ruzstd::encoding::CompressionLevel::Fastest);
@@ -90,29 +90,29 @@ impl Section {
         Ok(bytes)
     }
 
-    /// Whether bytes begin like this kind.
+    /// Returns whether bytes begin with this type of section.
     pub(crate) fn begins(self, bytes: &[u8]) -> bool {
         bytes.starts_with(self.magic.as_bytes())
     }
 
-    /// What of `bytes` is of this kind, still packed and without its header, and what comes after it.
+    /// Splits `bytes` into the compressed records of this section, without its header, and the bytes after it.
     ///
     /// # Errors
-    /// If the bytes are of another kind or version, cut, or altered.
+    /// If the bytes begin with another type or version of section, or are truncated or altered.
     pub(crate) fn split(self, bytes: &[u8]) -> Result<(PackedSection<'_>, &[u8]), ContainerError> {
         let rest = bytes.strip_prefix(self.magic.as_bytes()).ok_or(ContainerError::Foreign(self.magic))?;
-        let cut = |announced: u64| ContainerError::Length { found: bytes.len() as u64, announced };
+        let wrong_length = |announced: u64| ContainerError::Length { found: bytes.len() as u64, announced };
         let header = self.header() as u64;
-        let (version, rest) = rest.split_first_chunk::<2>().ok_or_else(|| cut(header))?;
+        let (version, rest) = rest.split_first_chunk::<2>().ok_or_else(|| wrong_length(header))?;
         let found = u16::from_le_bytes(*version);
         if found != self.version {
             return Err(ContainerError::Version { magic: self.magic, found, version: self.version });
         }
-        let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(|| cut(header))?;
-        let (checksum, rest) = rest.split_first_chunk::<4>().ok_or_else(|| cut(header))?;
+        let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(|| wrong_length(header))?;
+        let (checksum, rest) = rest.split_first_chunk::<4>().ok_or_else(|| wrong_length(header))?;
         let (length, announced) = (u64::from_le_bytes(*length), u32::from_le_bytes(*checksum));
         let at = usize::try_from(length).ok().and_then(|length| rest.split_at_checked(length));
-        let (packed, rest) = at.ok_or_else(|| cut(length.saturating_add(header)))?;
+        let (packed, rest) = at.ok_or_else(|| wrong_length(length.saturating_add(header)))?;
         let found = crc32fast::hash(packed);
         if found != announced {
             return Err(ContainerError::Checksum { found, announced });
@@ -120,10 +120,10 @@ impl Section {
         Ok((PackedSection(packed), rest))
     }
 
-    /// The same of `bytes` that hold nothing else.
+    /// Returns the compressed records of `bytes` that hold this section only.
     ///
     /// # Errors
-    /// If the bytes are of another kind or version, cut, appended to, or altered.
+    /// If the bytes hold another type or version of section, or are truncated, extended or altered.
     pub(crate) fn whole(self, bytes: &[u8]) -> Result<PackedSection<'_>, ContainerError> {
         let (packed, rest) = self.split(bytes)?;
         if rest.is_empty() {
@@ -133,24 +133,24 @@ impl Section {
         Err(ContainerError::Length { found, announced: found - rest.len() as u64 })
     }
 
-    /// The records in `bytes` that hold nothing else.
+    /// Reads the records of `bytes` that hold this section only.
     ///
     /// # Errors
-    /// As [`Section::whole`], or if they are no records.
+    /// As [`Section::whole`], or if the records cannot be deserialised.
     pub(crate) fn unpack<T: DeserializeOwned>(self, bytes: &[u8]) -> Result<T, ContainerError> {
         self.whole(bytes)?.unpack()
     }
 }
 
-/// Records as they were packed, checksum proved.
+/// Compressed records whose checksum has been verified.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PackedSection<'a>(&'a [u8]);
 
 impl PackedSection<'_> {
-    /// The records.
+    /// Decompresses and deserialises the records.
     ///
     /// # Errors
-    /// If they are none.
+    /// If they cannot be deserialised.
     pub(crate) fn unpack<T: DeserializeOwned>(self) -> Result<T, ContainerError> {
         let wrong = |error: &dyn std::fmt::Display| ContainerError::Records(error.to_string());
         let mut plain = Vec::new();

@@ -1,4 +1,4 @@
-//! A point of the static world.
+//! Landmarks: points of the map that keyframes observe.
 
 use nalgebra::{Point3, Vector3};
 
@@ -6,61 +6,60 @@ use crate::features::Descriptor;
 use crate::map::KeyFrameId;
 
 slotmap::new_key_type! {
-    /// Names a landmark; never reused for another one.
+    /// Identifier of a landmark; never used again for another one.
     pub struct LandmarkId;
 }
 
-/// A point of the static world, seen by keyframes.
+/// A landmark: a point of the static world that keyframes observe.
 #[derive(Clone, Debug)]
 pub struct Landmark {
     /// Position in the world, m.
     pub position: Point3<f64>,
-    /// The descriptor with the least median distance to those of all observations.
+    /// Descriptor with the least median distance to the descriptors of all observations.
     pub descriptor: Descriptor,
     /// Mean direction from the observing cameras to the point, unit length.
     pub normal: Vector3<f64>,
-    /// Farthest distance at which it should be found at the finest level, m.
+    /// Largest distance at which the ORB extractor can detect it, m: there it appears on the finest level.
     pub max_distance_m: f64,
-    /// Nearest distance at which it should be found at the coarsest level, m.
+    /// Least distance at which the ORB extractor can detect it, m: there it appears on the coarsest level.
     pub min_distance_m: f64,
-    /// Keyframes that see it, with the index of the feature.
+    /// Keyframes that observe it, with the feature index.
     pub observations: Vec<(KeyFrameId, u32)>,
-    /// The keyframe that made it.
+    /// Keyframe that created it, or the oldest observing one if that was removed.
     pub reference: KeyFrameId,
-    /// Sequence number of the keyframe that made it.
+    /// Sequence number of the keyframe that created it.
     pub born: u64,
-    /// Frames in whose view it should have been.
+    /// Number of frames in which it was expected to be visible.
     pub visible: u32,
-    /// Frames in which it was found and fitted the pose.
+    /// Number of frames in which it was matched as an inlier.
     pub found: u32,
-    /// Log-odds that it still stands where it was: up with each frame that found it, down with each that saw through it.
+    /// Existence log-odds: increased by each frame that matches it, decreased by each frame that measures free space at its position.
     pub existence_log_odds: f32,
-    /// Mean colour at its features, red, green, blue.
+    /// Colour at the feature from which it was created: red, green, blue.
     pub color: [u8; 3],
 }
 
 impl Landmark {
-    /// Log-odds of a landmark that nothing speaks against, and the most that is kept: those of OctoMap's greatest probability, 0.97
-    /// (Hornung et al., Autonomous Robots 2013).
+    /// Initial and largest existence log-odds: those of the largest probability in OctoMap, 0.97 (Hornung et al., Autonomous Robots 2013).
     pub(crate) const MAX_EXISTENCE_LOG_ODDS: f32 = 3.48;
-    /// What a frame that found it adds: OctoMap's hit, 0.7.
+    /// Change by a frame that matches the landmark: OctoMap's hit, 0.7.
     pub(crate) const MATCHED_LOG_ODDS: f32 = 0.85;
-    /// What a frame that saw through it adds: OctoMap's miss, 0.4.
+    /// Change by a frame that measures free space at the landmark: OctoMap's miss, 0.4.
     pub(crate) const FREE_SPACE_LOG_ODDS: f32 = -0.41;
-    /// Below, it is gone: OctoMap's least probability, 0.12.
+    /// Existence log-odds below which a landmark is removed: OctoMap's least probability, 0.12.
     pub(crate) const MIN_EXISTENCE_LOG_ODDS: f32 = -1.99;
 
-    /// Probability that it still stands where it was, as a share of that of a landmark that nothing speaks against.
+    /// Returns the probability that the landmark still exists, divided by the largest such probability, in [0, 1].
     pub(crate) fn trust(&self) -> f32 {
         (1.0 + (-Self::MAX_EXISTENCE_LOG_ODDS).exp()) / (1.0 + (-self.existence_log_odds).exp())
     }
 
-    /// Of the frames that should have seen it, the share that did.
+    /// Returns the share of matched frames among the frames in which the landmark was expected to be visible.
     pub(crate) fn found_ratio(&self) -> f64 {
         f64::from(self.found) / f64::from(self.visible.max(1))
     }
 
-    /// Feature index in a keyframe, if it sees the landmark.
+    /// Returns the index of the feature with which a keyframe observes the landmark.
     pub(crate) fn feature_in(&self, keyframe: KeyFrameId) -> Option<usize> {
         self.observations.iter().find(|(k, _)| *k == keyframe).map(|(_, f)| *f as usize)
     }
@@ -73,7 +72,7 @@ mod tests {
     use crate::map::scene::Scene;
 
     #[test]
-    fn a_landmark_that_is_seen_through_loses_trust_and_goes_unless_it_is_found_again() {
+    fn a_landmark_in_free_space_loses_trust_and_is_removed_unless_it_is_matched() {
         let (scene, mut map) = (Scene::new(), Map::default());
         let first = scene.add(&mut map, 0, &scene.pose(0), &[]);
         let ids: Vec<LandmarkId> = map.keyframe(first).unwrap().observed().map(|(_, id)| id).take(2).collect();
@@ -83,8 +82,8 @@ mod tests {
                 map.count_found(ids[1]);
             }
             if frame == 5 {
-                let [gone, found] = [0, 1].map(|i| map.landmark(ids[i]).unwrap().trust());
-                assert!(gone < 0.8 && found > 0.98, "{gone} {found}");
+                let [missed, matched] = [0, 1].map(|i| map.landmark(ids[i]).unwrap().trust());
+                assert!(missed < 0.8 && matched > 0.98, "{missed} {matched}");
             }
         }
         assert!(map.landmark(ids[0]).is_none() && map.landmark(ids[1]).is_some());

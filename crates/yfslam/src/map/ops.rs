@@ -1,4 +1,4 @@
-//! Every change of the map. Each operation leaves the invariants of [`crate::map`] standing and ignores ids that are gone.
+//! Changes of the map. Each operation preserves the invariants of [`crate::map`] and ignores ids of removed items.
 
 use nalgebra::{Point3, Vector3};
 use slotmap::SecondaryMap;
@@ -7,11 +7,11 @@ use crate::features::FrameFeatures;
 use crate::geometry::{Pose, Similarity, rigid};
 use crate::map::{KeyFrame, KeyFrameId, Landmark, LandmarkId, Map};
 
-/// Shared landmarks that make two keyframes covisible. Source: ORB-SLAM2.
+/// Number of shared landmarks from which two keyframes are covisible. Source: ORB-SLAM2.
 pub(crate) const COVISIBLE_MIN_SHARED: usize = 15;
 
 impl Map {
-    /// Adds a keyframe without observations and outside the spanning tree; [`Map::update_covisibility`] connects it.
+    /// Inserts a keyframe without observations and without parent; [`Map::update_covisibility`] connects it.
     pub(crate) fn insert_keyframe(
         &mut self,
         timestamp_ns: i64,
@@ -35,7 +35,8 @@ impl Map {
         })
     }
 
-    /// Adds a landmark at `position` (world, m) seen by feature `feature` of `keyframe`; replaces what the feature saw before.
+    /// Inserts a landmark at `position` (world, m) that feature `feature` of `keyframe` observes; an earlier observation by the feature is
+    /// removed.
     pub(crate) fn insert_landmark(
         &mut self,
         position: Point3<f64>,
@@ -66,8 +67,8 @@ impl Map {
         Some(id)
     }
 
-    /// Notes that `feature` of `keyframe` sees `landmark`; replaces what the feature saw before. Does nothing if the keyframe sees
-    /// the landmark with another feature already.
+    /// Adds the observation of `landmark` by `feature` of `keyframe`; an earlier observation by the feature is removed. Does nothing if the
+    /// keyframe observes the landmark already.
     pub(crate) fn add_observation(&mut self, landmark: LandmarkId, keyframe: KeyFrameId, feature: usize) {
         let Some(slot) = self.keyframes.get(keyframe).and_then(|k| k.landmarks.get(feature)) else { return };
         let previous = *slot;
@@ -81,7 +82,7 @@ impl Map {
         self.keyframes[keyframe].landmarks[feature] = Some(landmark);
     }
 
-    /// Takes the observation of `landmark` by `keyframe` away; a landmark without observations is removed.
+    /// Removes the observation of `landmark` by `keyframe`; a landmark without observations is removed.
     pub(crate) fn remove_observation(&mut self, landmark: LandmarkId, keyframe: KeyFrameId) {
         let Some(l) = self.landmarks.get_mut(landmark) else { return };
         let Some(at) = l.observations.iter().position(|(k, _)| *k == keyframe) else { return };
@@ -105,14 +106,14 @@ impl Map {
         }
     }
 
-    /// Hands the observations of `gone` over to `kept` and removes `gone`. Where a keyframe sees both, `kept` keeps its feature.
-    pub(crate) fn merge_landmarks(&mut self, kept: LandmarkId, gone: LandmarkId) {
-        if kept == gone || !self.landmarks.contains_key(kept) {
+    /// Moves the observations of `removed` to `kept` and removes `removed`. In a keyframe that observes both, `kept` keeps its feature.
+    pub(crate) fn merge_landmarks(&mut self, kept: LandmarkId, removed: LandmarkId) {
+        if kept == removed || !self.landmarks.contains_key(kept) {
             return;
         }
-        let Some(l) = self.landmarks.get(gone) else { return };
+        let Some(l) = self.landmarks.get(removed) else { return };
         let (observations, visible, found) = (l.observations.clone(), l.visible, l.found);
-        self.remove_landmark(gone);
+        self.remove_landmark(removed);
         for (keyframe, feature) in observations {
             self.add_observation(kept, keyframe, feature as usize);
         }
@@ -121,7 +122,7 @@ impl Map {
         l.found += found;
     }
 
-    /// Recomputes descriptor, normal and distance range of a landmark from its observations.
+    /// Updates descriptor, normal and distance range of a landmark from its observations.
     pub(crate) fn update_landmark(&mut self, landmark: LandmarkId, scale_factors: &[f32]) {
         let Some(l) = self.landmarks.get(landmark) else { return };
         let mut normal = Vector3::zeros();
@@ -132,7 +133,7 @@ impl Map {
             normal += (l.position - center).normalize();
             descriptors.push(keyframe.features.descriptors[f as usize]);
         }
-        // The reference may have been culled; remove_observation then names another.
+        // `remove_observation` replaces a reference that is removed, so both exist unless the map is inconsistent.
         let (Some(reference), Some(feature)) = (self.keyframes.get(l.reference), l.feature_in(l.reference)) else {
             return;
         };
@@ -159,21 +160,21 @@ impl Map {
         }
     }
 
-    /// Moves a landmark, m.
+    /// Sets the position of a landmark (world, m).
     pub(crate) fn set_position(&mut self, landmark: LandmarkId, position: Point3<f64>) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.position = position;
         }
     }
 
-    /// Moves a keyframe.
+    /// Sets the pose of a keyframe.
     pub(crate) fn set_pose(&mut self, keyframe: KeyFrameId, t_cam_world: Pose) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
             k.t_cam_world = t_cam_world;
         }
     }
 
-    /// Moves a keyframe to where a similarity has it, whose scale is that of the keyframe's unit now to the unit of the world.
+    /// Sets the pose of a keyframe to that of a similarity and divides its unit of length by the scale.
     pub(crate) fn set_scaled_pose(&mut self, keyframe: KeyFrameId, s_cam_world: &Similarity) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
             k.t_cam_world = rigid(s_cam_world);
@@ -181,14 +182,14 @@ impl Map {
         }
     }
 
-    /// Counts a frame that should have seen the landmark.
+    /// Counts a frame in which the landmark was expected to be visible.
     pub(crate) fn count_visible(&mut self, landmark: LandmarkId) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.visible += 1;
         }
     }
 
-    /// Counts a frame that found the landmark.
+    /// Counts a frame that matched the landmark as an inlier.
     pub(crate) fn count_found(&mut self, landmark: LandmarkId) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.found += 1;
@@ -197,7 +198,7 @@ impl Map {
         }
     }
 
-    /// Notes a frame that saw through the landmark; one that is likely gone is removed.
+    /// Counts a frame that measured free space at the landmark, and removes the landmark if it probably does not exist any more.
     pub(crate) fn count_free_space(&mut self, landmark: LandmarkId) {
         let Some(l) = self.landmarks.get_mut(landmark) else { return };
         l.existence_log_odds += Landmark::FREE_SPACE_LOG_ODDS;
@@ -206,21 +207,21 @@ impl Map {
         }
     }
 
-    /// Recounts which keyframes share landmarks with `keyframe` and updates both sides; a keyframe not yet in the spanning tree
-    /// becomes a child of the one it shares most with.
+    /// Recomputes the covisible keyframes of `keyframe` and updates both sides. A keyframe without parent becomes a child of the one with
+    /// which it shares most landmarks.
     pub(crate) fn update_covisibility(&mut self, keyframe: KeyFrameId) {
         let Some(k) = self.keyframes.get(keyframe) else { return };
-        let mut seen: Vec<KeyFrameId> = k
+        let mut observers: Vec<KeyFrameId> = k
             .observed()
             .filter_map(|(_, l)| self.landmarks.get(l))
             .flat_map(|l| l.observations.iter().map(|(other, _)| *other))
             .filter(|other| *other != keyframe)
             .collect();
-        seen.sort_unstable();
+        observers.sort_unstable();
         let mut counts: Vec<(KeyFrameId, usize)> =
-            seen.chunk_by(|a, b| a == b).map(|run| (run[0], run.len())).collect();
+            observers.chunk_by(|a, b| a == b).map(|same| (same[0], same.len())).collect();
         counts.sort_by_key(|&(id, count)| (std::cmp::Reverse(count), id));
-        // The best one always counts, so that the graph stays connected.
+        // The first one is always covisible, so that the graph stays connected.
         let keep = counts.partition_point(|&(_, count)| count >= COVISIBLE_MIN_SHARED).max(1).min(counts.len());
         counts.truncate(keep);
         let before = std::mem::take(&mut self.keyframes[keyframe].covisible);
@@ -234,7 +235,7 @@ impl Map {
             let at = list.partition_point(|&(id, c)| (std::cmp::Reverse(c), id) < (std::cmp::Reverse(count), keyframe));
             list.insert(at, (keyframe, count));
         }
-        // The root of a submap has none: whom it sees hangs on it.
+        // The root of a submap has no parent: its covisible keyframes are its descendants.
         let parent = counts.first().map(|(id, _)| *id).filter(|parent| self.root(*parent) != Some(keyframe));
         let k = &mut self.keyframes[keyframe];
         k.covisible = counts;
@@ -244,7 +245,7 @@ impl Map {
         }
     }
 
-    /// Notes that two keyframes closed a loop.
+    /// Adds a loop edge between two keyframes.
     pub(crate) fn add_loop_edge(&mut self, a: KeyFrameId, b: KeyFrameId) {
         if a == b || !self.keyframes.contains_key(a) || !self.keyframes.contains_key(b) {
             return;
@@ -257,16 +258,16 @@ impl Map {
         }
     }
 
-    /// Removes a keyframe with its observations; its children go to its parent. The first keyframe, those outside the spanning tree
-    /// and those that closed a loop stay: returns whether it was removed.
+    /// Removes a keyframe with its observations; its children become children of its parent. Keyframes without parent and keyframes with
+    /// loop edges are not removed. Returns whether the keyframe was removed.
     pub(crate) fn remove_keyframe(&mut self, keyframe: KeyFrameId) -> bool {
         let removable = self.keyframes.get(keyframe).filter(|k| k.loop_edges.is_empty());
         let Some(parent) = removable.and_then(|k| k.parent) else { return false };
-        let matches: Vec<LandmarkId> = self.keyframes[keyframe].observed().map(|(_, l)| l).collect();
-        for landmark in matches {
+        let landmarks: Vec<LandmarkId> = self.keyframes[keyframe].observed().map(|(_, l)| l).collect();
+        for landmark in landmarks {
             self.remove_observation(landmark, keyframe);
         }
-        let (Some(own), Some(above)) = (self.own_pose(keyframe), self.own_pose(parent)) else { return false };
+        let (Some(own), Some(of_parent)) = (self.own_pose(keyframe), self.own_pose(parent)) else { return false };
         let Some(k) = self.keyframes.remove(keyframe) else { return false };
         for (other, _) in &k.covisible {
             self.keyframes[*other].covisible.retain(|(id, _)| *id != keyframe);
@@ -276,11 +277,11 @@ impl Map {
             self.keyframes[child].parent = Some(parent);
             self.keyframes[parent].children.push(child);
         }
-        self.removed.insert(keyframe, (parent, own * above.inverse()));
+        self.removed.insert(keyframe, (parent, own * of_parent.inverse()));
         true
     }
 
-    /// Checks the invariants; an error names the first that is broken. For tests and for maps read from files.
+    /// Checks the invariants, for tests and for maps that were read from files. The error describes the first violation.
     pub(crate) fn validate(&self) -> Result<(), String> {
         let roots = self.keyframes.iter().filter(|(_, k)| k.parent.is_none()).map(|(id, _)| id);
         let mut submap_of = SecondaryMap::new();
@@ -292,7 +293,7 @@ impl Map {
         }
         for (id, l) in &self.landmarks {
             if l.observations.windows(2).any(|pair| submap_of.get(pair[0].0) != submap_of.get(pair[1].0)) {
-                return Err(format!("landmark {id:?} is seen from two submaps"));
+                return Err(format!("landmark {id:?} is observed from two submaps"));
             }
             if l.observations.is_empty() {
                 return Err(format!("landmark {id:?} has no observation"));
@@ -300,14 +301,18 @@ impl Map {
             for &(k, f) in &l.observations {
                 let listed = self.keyframes.get(k).and_then(|k| k.landmarks.get(f as usize)).copied().flatten();
                 if listed != Some(id) {
-                    return Err(format!("landmark {id:?} names feature {f} of {k:?}, which lists {listed:?}"));
+                    return Err(format!(
+                        "landmark {id:?} is observed by feature {f} of {k:?}, but that feature observes {listed:?}"
+                    ));
                 }
             }
         }
         for (id, k) in &self.keyframes {
             for (f, l) in k.observed() {
                 if self.landmarks.get(l).and_then(|l| l.feature_in(id)) != Some(f) {
-                    return Err(format!("feature {f} of {id:?} names {l:?}, which does not list it"));
+                    return Err(format!(
+                        "feature {f} of {id:?} observes {l:?}, but that landmark does not list the observation"
+                    ));
                 }
             }
             for &(other, count) in &k.covisible {
@@ -323,7 +328,7 @@ impl Map {
                 return Err(format!("the parent of {id:?} does not list it as a child"));
             }
             if k.children.iter().any(|c| self.keyframes.get(*c).is_none_or(|c| c.parent != Some(id))) {
-                return Err(format!("a child of {id:?} does not name it as its parent"));
+                return Err(format!("a child of {id:?} has another parent"));
             }
         }
         Ok(())

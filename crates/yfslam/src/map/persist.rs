@@ -1,7 +1,7 @@
-//! Maps as bytes: the keyframes and landmarks, packed.
+//! Saved maps: keyframes and landmarks as bytes.
 //!
-//! The records hold what cannot be computed: search grids, observation lists and covisibility are made anew. In: a map and the camera and
-//! feature settings it was made with. Out: bytes, and back. Nothing here touches files.
+//! In: a map, and the camera and feature configuration with which it was made. Out: bytes; and the reverse. The records hold only what
+//! cannot be computed: search grids, observation lists and covisibility are computed when a map is read. This module does not access files.
 
 use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -14,17 +14,17 @@ use crate::geometry::Pose;
 use crate::map::container::{DENSE_MAP, MAP};
 use crate::map::{KeyFrameId, LandmarkId, Map};
 
-/// Why bytes are no map that can be used.
+/// Reason why bytes cannot be read as a saved map.
 pub use crate::map::container::ContainerError as MapError;
 
-/// A map with what it was made with.
+/// A map with the camera and the feature configuration with which it was made.
 #[derive(Clone, Debug)]
 pub(crate) struct MapParts {
-    /// The map.
+    /// Map.
     pub map: Map,
-    /// The camera that saw it.
+    /// Camera.
     pub camera: Camera,
-    /// Feature settings: with others nothing would be recognised.
+    /// Feature configuration; with another one descriptors would not match.
     pub features: FeatureConfig,
 }
 
@@ -37,13 +37,13 @@ struct Records {
     landmarks: Vec<LandmarkRecord>,
 }
 
-/// A camera without optional fields, as a format that does not name its fields needs it.
+/// A camera in a format without field names, in which no field is optional.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct CameraRecord {
     size: [u32; 2],
     intrinsics: [f64; 4],
     distortion: [f64; 5],
-    /// Depth units per metre in older files; they belong to the images now.
+    /// Depth units per metre in older files; now they belong to the depth images.
     reserved: f64,
     fps: f64,
     bf: f64,
@@ -56,7 +56,7 @@ struct KeyFrameRecord {
     /// `t_cam_world`: x y z, quaternion x y z w.
     pose: [f64; 7],
     features: Vec<FeatureRecord>,
-    /// Index of the landmark seen by each feature.
+    /// Index of the landmark that each feature observes.
     landmarks: Vec<Option<u32>>,
     parent: Option<u32>,
     loop_edges: Vec<u32>,
@@ -83,18 +83,18 @@ struct LandmarkRecord {
     color: [u8; 3],
 }
 
-/// The map as bytes.
+/// Returns the map as bytes.
 ///
 /// # Errors
-/// If the records cannot be written, which would be a fault of this program.
+/// If serialisation fails, which would be a fault of this program.
 pub(crate) fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Vec<u8>, MapError> {
     MAP.pack(&Records::of(map, camera, features))
 }
 
-/// The map in `bytes`, checked. Pieces that stand before it ([`crate::dense::persist`]) are checked and passed over.
+/// Reads and checks a map. The section of a dense map before it is verified and skipped.
 ///
 /// # Errors
-/// If the bytes are no map, of another version, cut, altered, or contradict themselves.
+/// If the bytes are not a map, have another version, are truncated or altered, or if the records are inconsistent.
 pub(crate) fn decode(bytes: &[u8]) -> Result<MapParts, MapError> {
     let map = if DENSE_MAP.begins(bytes) { DENSE_MAP.split(bytes)?.1 } else { bytes };
     let records: Records = MAP.unpack(map)?;
@@ -103,7 +103,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<MapParts, MapError> {
 
 impl Records {
     fn of(map: &Map, camera: &Camera, features: &FeatureConfig) -> Self {
-        // By age, so that the same map gives the same bytes whatever was removed from its arenas.
+        // In the order of insertion, so that the bytes do not depend on removed items in the arenas.
         let mut keyframes: Vec<(u64, KeyFrameId)> = map.keyframes().map(|(id, k)| (k.sequence, id)).collect();
         keyframes.sort_unstable();
         let number = |i: usize| i as u32;
@@ -155,10 +155,12 @@ impl Records {
         for (i, record) in self.keyframes.iter().enumerate() {
             if record.landmarks.len() != record.features.len() {
                 let (features, landmarks) = (record.features.len(), record.landmarks.len());
-                return Err(format!("keyframe {i} has {features} features but landmarks for {landmarks}"));
+                return Err(format!(
+                    "keyframe {i} has {features} features but {landmarks} entries for their landmarks"
+                ));
             }
-            let pose =
-                pose_of(&record.pose).ok_or_else(|| format!("the pose of keyframe {i} is none: {:?}", record.pose))?;
+            let pose = pose_of(&record.pose)
+                .ok_or_else(|| format!("the pose of keyframe {i} is invalid: {:?}", record.pose))?;
             let (features, descriptors) = record.features.iter().map(FeatureRecord::feature).unzip();
             ids.push(map.restore_keyframe(
                 record.timestamp_ns,
@@ -168,30 +170,30 @@ impl Records {
             ));
         }
         map.restore_count(self.keyframes_ever)?;
-        let mut seen_by: Vec<Vec<(KeyFrameId, usize)>> = vec![Vec::new(); self.landmarks.len()];
+        let mut observers: Vec<Vec<(KeyFrameId, usize)>> = vec![Vec::new(); self.landmarks.len()];
         for (id, record) in ids.iter().zip(&self.keyframes) {
             for (feature, landmark) in record.landmarks.iter().enumerate() {
                 let Some(landmark) = *landmark else { continue };
-                let seen_by = seen_by.get_mut(landmark as usize);
-                seen_by
+                let observers = observers.get_mut(landmark as usize);
+                observers
                     .ok_or_else(|| {
-                        format!("a feature sees landmark {landmark}, of which there are {}", self.landmarks.len())
+                        format!("a feature observes landmark {landmark}, but there are only {}", self.landmarks.len())
                     })?
                     .push((*id, feature));
             }
         }
-        for (i, (record, observations)) in self.landmarks.iter().zip(&seen_by).enumerate() {
+        for (i, (record, observations)) in self.landmarks.iter().zip(&observers).enumerate() {
             let position = Point3::from(record.position);
             let reference = ids.get(record.reference as usize).copied();
             let first = observations.iter().find(|(k, _)| Some(*k) == reference);
             let (Some(&(keyframe, feature)), true) = (first, position.coords.iter().all(|c| c.is_finite())) else {
                 return Err(format!(
-                    "landmark {i} at {position} is not seen by its reference keyframe {}",
+                    "landmark {i} at {position} is not observed by its reference keyframe {}",
                     record.reference
                 ));
             };
             let restored = map.insert_landmark(position, keyframe, feature, record.color, scale_factors);
-            let id = restored.ok_or_else(|| format!("landmark {i} cannot be placed"))?;
+            let id = restored.ok_or_else(|| format!("landmark {i} cannot be inserted"))?;
             for (keyframe, feature) in observations {
                 map.add_observation(id, *keyframe, *feature);
             }
@@ -200,7 +202,8 @@ impl Records {
         }
         for (id, record) in ids.iter().zip(&self.keyframes) {
             let of_number = |number: &u32| ids.get(*number as usize).copied();
-            let missing = |number: u32| format!("a keyframe names keyframe {number}, of which there are {}", ids.len());
+            let missing =
+                |number: u32| format!("a keyframe refers to keyframe {number}, but there are only {}", ids.len());
             if let Some(parent) = record.parent {
                 map.restore_parent(*id, of_number(&parent).ok_or_else(|| missing(parent))?)?;
             }
@@ -274,9 +277,9 @@ pub(crate) fn pose_record(pose: &Pose) -> [f64; 7] {
 
 pub(crate) fn pose_of([x, y, z, i, j, k, w]: &[f64; 7]) -> Option<Pose> {
     let quaternion = Quaternion::new(*w, *i, *j, *k);
-    let good = Vector3::new(*x, *y, *z).iter().all(|c| c.is_finite()) && (quaternion.norm() - 1.0).abs() < 1e-6;
-    // The bits are kept as they are: a map read back is the map that was written.
-    good.then(|| Pose::from_parts(Translation3::new(*x, *y, *z), UnitQuaternion::new_unchecked(quaternion)))
+    let is_valid = Vector3::new(*x, *y, *z).iter().all(|c| c.is_finite()) && (quaternion.norm() - 1.0).abs() < 1e-6;
+    // The quaternion is not normalised again, so that a map that is read has the same bits as the map that was written.
+    is_valid.then(|| Pose::from_parts(Translation3::new(*x, *y, *z), UnitQuaternion::new_unchecked(quaternion)))
 }
 
 #[cfg(test)]
@@ -289,7 +292,7 @@ mod tests {
         Camera::pinhole(640, 480, 535.4, 539.2, 320.1, 247.6).with_distortion([0.1, -0.2, 0.001, 0.002, 0.0])
     }
 
-    /// Four keyframes that see forty landmarks, one of them removed again.
+    /// Returns a map of five keyframes and forty landmarks, from which one of each was removed.
     fn map() -> Map {
         let mut map = Map::default();
         let scales = [1.0, 1.2, 1.44, 1.728, 2.07, 2.49, 2.99, 3.58];
@@ -330,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_read_back_is_the_map_that_was_written() {
+    fn a_map_that_is_read_equals_the_map_that_was_written() {
         let (map, features) = (map(), FeatureConfig::default());
         let bytes = encode(&map, &camera(), &features).unwrap();
         let read = decode(&bytes).unwrap();
@@ -351,10 +354,10 @@ mod tests {
     }
 
     #[test]
-    fn no_cut_and_no_flipped_bit_goes_unnoticed() {
+    fn truncated_bytes_and_flipped_bits_are_refused() {
         let bytes = encode(&map(), &camera(), &FeatureConfig::default()).unwrap();
         for length in (0..bytes.len()).step_by(97).chain(0..40) {
-            assert!(decode(&bytes[..length]).is_err(), "cut to {length} bytes");
+            assert!(decode(&bytes[..length]).is_err(), "truncated to {length} bytes");
         }
         for bit in (0..8 * bytes.len()).step_by(53).chain(0..8 * 64) {
             let mut altered = bytes.clone();
@@ -364,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_say_what_is_wrong_with_the_bytes() {
+    fn errors_describe_what_is_wrong_with_the_bytes() {
         let bytes = encode(&map(), &camera(), &FeatureConfig::default()).unwrap();
         assert_eq!(decode(b"PK\x03\x04").unwrap_err(), MapError::Foreign(MAP.magic));
         let mut newer = bytes.clone();

@@ -1,4 +1,4 @@
-//! A small world with exact measurements, for tests of what changes the map.
+//! A small scene with exact measurements, for tests of changes of the map.
 
 use nalgebra::{Point3, Vector6};
 
@@ -9,13 +9,13 @@ use crate::context::SensorModel;
 use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds};
 use crate::geometry::{Pose, se3_exp};
 
-/// Points on a wavy wall, and the cameras that pass it.
+/// Points on an uneven wall, and cameras that move along it.
 pub(crate) struct Scene {
     pub sensor: SensorModel,
     points: Vec<Point3<f64>>,
 }
 
-/// The camera of the scene.
+/// Returns the camera of the scene.
 pub(crate) fn camera() -> Camera {
     Camera::pinhole(640, 480, 520.0, 510.0, 320.0, 240.0)
 }
@@ -31,16 +31,17 @@ impl Scene {
         Self { sensor, points: (0..160).map(point).collect() }
     }
 
-    /// True pose `t_cam_world` of camera `k`.
+    /// Returns the true pose `t_cam_world` of camera `k`.
     pub(crate) fn pose(&self, k: usize) -> Pose {
         se3_exp(&(Vector6::new(-0.15, 0.01, 0.02, 0.0, 0.01, 0.002) * k as f64))
     }
 
-    /// Adds camera `k` at `believed` (`t_cam_world`) with landmarks where it believes them, unless `shared` has them already.
-    pub(crate) fn add(&self, map: &mut Map, k: usize, believed: &Pose, shared: &[KeyFrameId]) -> KeyFrameId {
+    /// Inserts camera `k` with the estimated pose `estimate` (`t_cam_world`). Points that the keyframes `shared` observe get another
+    /// observation; the others become landmarks, placed according to the estimate.
+    pub(crate) fn add(&self, map: &mut Map, k: usize, estimate: &Pose, shared: &[KeyFrameId]) -> KeyFrameId {
         let pose = self.pose(k);
         let c = &self.sensor.pinhole;
-        let mut seen = Vec::new();
+        let mut visible = Vec::new();
         let (mut features, mut descriptors) = (Vec::new(), Vec::new());
         for (number, point) in self.points.iter().enumerate() {
             let p = pose * point;
@@ -52,12 +53,12 @@ impl Scene {
             let depth_m = Some(p.z as f32);
             features.push(Feature { raw: [u, v], u, v, octave: 0, angle_rad: 0.0, depth_m, trust: 1.0 });
             descriptors.push(Descriptor([number as u64; 4].map(|n| n.wrapping_mul(0x9e37_79b9_7f4a_7c15))));
-            seen.push(number);
+            visible.push(number);
         }
         let bounds = ImageBounds { u_min: 0.0, u_max: 640.0, v_min: 0.0, v_max: 480.0 };
         let descriptors_of = descriptors.clone();
-        let id = map.insert_keyframe(k as i64, *believed, FrameFeatures::from_parts(features, descriptors, bounds));
-        for (feature, number) in seen.iter().enumerate() {
+        let id = map.insert_keyframe(k as i64, *estimate, FrameFeatures::from_parts(features, descriptors, bounds));
+        for (feature, number) in visible.iter().enumerate() {
             let known = shared.iter().filter_map(|other| map.keyframe(*other)).find_map(|other| {
                 let same = |(i, landmark): (usize, _)| {
                     (other.features.descriptors[i] == descriptors_of[feature]).then_some(landmark)
@@ -67,7 +68,7 @@ impl Scene {
             match known {
                 Some(landmark) => map.add_observation(landmark, id, feature),
                 None => {
-                    let position = believed.inverse() * (pose * self.points[*number]);
+                    let position = estimate.inverse() * (pose * self.points[*number]);
                     map.insert_landmark(position, id, feature, [0; 3], &self.sensor.scale_factors);
                 }
             }

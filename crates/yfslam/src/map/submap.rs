@@ -1,11 +1,13 @@
-//! Parts of the map that have no landmark in common: each is a tree of keyframes with a world of its own, and its root defines that
-//! world. A place that two of them show makes one of them (Atlas: Elvira, Tardós and Montiel, IROS 2019).
+//! Submaps: trees of keyframes without common landmarks, each with its own world frame, which its root defines (Atlas: Elvira, Tardós and
+//! Montiel, IROS 2019).
+//!
+//! In: the similarity between two submaps that show the same place. Out: one submap.
 
 use super::{KeyFrameId, LandmarkId, Map};
 use crate::geometry::{Similarity, unscaled};
 
 impl Map {
-    /// The root of the submap that a keyframe belongs to: the keyframe that defines its world.
+    /// Returns the root of the submap of a keyframe: the keyframe that defines its world frame.
     pub fn root(&self, keyframe: KeyFrameId) -> Option<KeyFrameId> {
         let mut id = keyframe;
         loop {
@@ -14,13 +16,13 @@ impl Map {
                     Some(parent) => id = parent,
                     None => return Some(id),
                 },
-                // A removed one belongs where the keyframe belongs that it was tied to.
+                // A removed keyframe belongs to the submap of its last parent.
                 None => id = self.removed.get(&id)?.0,
             }
         }
     }
 
-    /// The keyframes of the submap with that root, in the order of their slots.
+    /// Returns the keyframes of the submap with this root, in the order of their slots.
     pub(crate) fn submap(&self, root: KeyFrameId) -> Vec<KeyFrameId> {
         let mut members = vec![root];
         let mut at = 0;
@@ -32,7 +34,7 @@ impl Map {
         members
     }
 
-    /// Number of keyframes in the submap of `keyframe`, counted up to `at_most`.
+    /// Counts the keyframes in the submap of `keyframe`, up to `at_most`.
     pub(crate) fn submap_size(&self, keyframe: KeyFrameId, at_most: usize) -> usize {
         self.root(keyframe).map_or(0, |root| self.tree_size(root, at_most))
     }
@@ -42,23 +44,23 @@ impl Map {
         k.children.iter().fold(1, |size, child| size + self.tree_size(*child, at_most - size))
     }
 
-    /// Number of submaps.
+    /// Returns the number of submaps.
     pub fn submap_count(&self) -> usize {
         self.keyframes.values().filter(|k| k.parent.is_none()).count()
     }
 
-    /// Landmarks that the keyframes see, each once.
+    /// Returns the landmarks that the keyframes observe, without duplicates.
     pub(crate) fn landmarks_of(&self, keyframes: &[KeyFrameId]) -> Vec<LandmarkId> {
-        let seen = keyframes.iter().filter_map(|id| self.keyframes.get(*id)).flat_map(|k| k.observed());
-        let mut landmarks: Vec<LandmarkId> = seen.map(|(_, id)| id).collect();
+        let observations = keyframes.iter().filter_map(|id| self.keyframes.get(*id)).flat_map(|k| k.observed());
+        let mut landmarks: Vec<LandmarkId> = observations.map(|(_, id)| id).collect();
         landmarks.sort_unstable();
         landmarks.dedup();
         landmarks
     }
 
-    /// Takes the submap of `keyframe` into the world of that of `parent`: everything in it moves by `s_parents_keyframes`, from its
-    /// own world and unit into the other one, and its tree hangs below `parent` by `keyframe`. Does nothing if they are of one submap.
-    pub(crate) fn weld(&mut self, keyframe: KeyFrameId, parent: KeyFrameId, s_parents_keyframes: &Similarity) {
+    /// Merges the submap of `keyframe` into that of `parent`. The similarity maps its world frame and unit of length into the other ones;
+    /// `keyframe` becomes a child of `parent`. Does nothing if both are in the same submap.
+    pub(crate) fn merge_submaps(&mut self, keyframe: KeyFrameId, parent: KeyFrameId, s_parents_keyframes: &Similarity) {
         let (Some(root), Some(other)) = (self.root(keyframe), self.root(parent)) else { return };
         if root == other || !self.keyframes.contains_key(keyframe) || !self.keyframes.contains_key(parent) {
             return;
@@ -71,19 +73,19 @@ impl Map {
             landmark.max_distance_m *= s_parents_keyframes.scaling();
             landmark.min_distance_m *= s_parents_keyframes.scaling();
         }
-        let back = s_parents_keyframes.inverse();
+        let inverse = s_parents_keyframes.inverse();
         for id in members {
-            let moved = unscaled(&self.keyframes[id].t_cam_world) * back;
+            let moved = unscaled(&self.keyframes[id].t_cam_world) * inverse;
             self.set_scaled_pose(id, &moved);
         }
-        // The way from the keyframe up to its root turns round; all else hangs where it hung.
+        // The edges from the keyframe up to its root are reversed; all other edges of the tree stay as they are.
         let (mut id, mut parent) = (keyframe, parent);
         loop {
-            let up = self.keyframes[id].parent.replace(parent);
+            let old_parent = self.keyframes[id].parent.replace(parent);
             self.keyframes[parent].children.push(id);
-            let Some(up) = up else { return };
-            self.keyframes[up].children.retain(|child| *child != id);
-            (parent, id) = (id, up);
+            let Some(old_parent) = old_parent else { return };
+            self.keyframes[old_parent].children.retain(|child| *child != id);
+            (parent, id) = (id, old_parent);
         }
     }
 
@@ -96,9 +98,9 @@ impl Map {
         for id in members {
             self.keyframes.remove(id);
         }
-        let gone: Vec<KeyFrameId> =
+        let without_ancestor: Vec<KeyFrameId> =
             self.removed.keys().filter(|id| self.keyframe_pose(**id).is_none()).copied().collect();
-        for id in gone {
+        for id in without_ancestor {
             self.removed.remove(&id);
         }
     }
@@ -111,8 +113,8 @@ mod tests {
     use crate::map::scene::Scene;
     use nalgebra::Vector6;
 
-    /// Two submaps of four keyframes each; the world of the second is another one.
-    fn apart() -> (Scene, Map, Vec<KeyFrameId>, Vec<KeyFrameId>, Pose) {
+    /// Returns two submaps of four keyframes each, with different world frames.
+    fn two_submaps() -> (Scene, Map, Vec<KeyFrameId>, Vec<KeyFrameId>, Pose) {
         let (scene, mut map) = (Scene::new(), Map::default());
         let other_world = se3_exp(&Vector6::new(3.0, -1.0, 0.5, 0.2, 1.0, -0.4));
         let (mut first, mut second) = (Vec::new(), Vec::new());
@@ -126,11 +128,11 @@ mod tests {
     }
 
     #[test]
-    fn welding_makes_two_worlds_one_and_keeps_the_tree() {
-        let (scene, mut map, first, second, other_world) = apart();
+    fn merged_submaps_have_one_world_and_one_tree() {
+        let (scene, mut map, first, second, other_world) = two_submaps();
         assert_eq!((map.validate(), map.submap_count()), (Ok(()), 2));
         assert_eq!(map.submap_size(second[3], 9), 4);
-        map.weld(second[3], first[3], &unscaled(&other_world));
+        map.merge_submaps(second[3], first[3], &unscaled(&other_world));
         assert_eq!((map.validate(), map.submap_count()), (Ok(()), 1));
         assert_eq!(map.root(second[0]), Some(first[0]));
         assert_eq!(map.keyframe(second[3]).unwrap().parent, Some(first[3]));
@@ -144,24 +146,24 @@ mod tests {
                 assert!((u - f64::from(f.u)).hypot(v - f64::from(f.v)) < 1e-3);
             }
         }
-        // Welded once, it is of the same submap.
-        map.weld(second[3], first[0], &unscaled(&other_world));
+        // A second merge does nothing, because both keyframes are in the same submap.
+        map.merge_submaps(second[3], first[0], &unscaled(&other_world));
         assert_eq!(map.keyframe(second[3]).unwrap().parent, Some(first[3]));
     }
 
     #[test]
-    fn a_submap_welded_at_another_scale_shows_the_same_and_what_hung_on_it_comes_along() {
-        let (scene, mut map, first, second, _) = apart();
+    fn a_submap_merged_at_another_scale_keeps_its_projections_and_relative_poses() {
+        let (scene, mut map, first, second, _) = two_submaps();
         let s_first_second = sim3_from_tangent(&[0.4, -1.0, 0.3, 0.1, 0.8, -0.2, 0.7].into());
         let near = se3_exp(&Vector6::new(0.1, 0.05, -0.1, 0.02, 0.0, 0.01));
-        // A frame that hangs on a keyframe that is removed, and keyframe and frame as they are before.
+        // The reference keyframe of this frame is removed; both poses before that are compared with those afterwards.
         let t_cam_world = near * map.keyframe_pose(second[1]).unwrap();
         let relative_pose = map.relative_pose(second[1], &t_cam_world).unwrap();
         let removed = map.keyframe_pose(second[1]).unwrap();
         assert!(map.remove_keyframe(second[1]));
         let own: Vec<_> =
             map.landmarks_of(&second).iter().map(|id| (*id, map.landmark(*id).unwrap().clone())).collect();
-        map.weld(second[3], first[3], &s_first_second);
+        map.merge_submaps(second[3], first[3], &s_first_second);
         assert_eq!(map.validate(), Ok(()));
         let center = |pose: &Pose| pose.inverse() * nalgebra::Point3::origin();
         let moved = |before: &Pose, after: &Pose| {
@@ -170,7 +172,7 @@ mod tests {
         };
         assert!(moved(&removed, &map.keyframe_pose(second[1]).unwrap()));
         assert!(moved(&t_cam_world, &map.absolute_pose(second[1], &relative_pose).unwrap()));
-        // What is tied from now on is so in the unit that the keyframe was mapped in, too.
+        // A new relative pose is in the unit of length at the insertion of the keyframe, too.
         let now = map.absolute_pose(second[1], &relative_pose).unwrap();
         assert!(
             (map.relative_pose(second[1], &now).unwrap() * relative_pose.inverse()).translation.vector.norm() < 1e-9
@@ -182,15 +184,15 @@ mod tests {
             for &(k, f) in &after.observations {
                 let keyframe = map.keyframe(k).unwrap();
                 let [u, v] = scene.sensor.pinhole.project(&(keyframe.t_cam_world * after.position).coords);
-                let seen = &keyframe.features.features[f as usize];
-                assert!((u - f64::from(seen.u)).hypot(v - f64::from(seen.v)) < 1e-3);
+                let feature = &keyframe.features.features[f as usize];
+                assert!((u - f64::from(feature.u)).hypot(v - f64::from(feature.v)) < 1e-3);
             }
         }
     }
 
     #[test]
-    fn a_submap_goes_with_all_that_hung_on_it() {
-        let (_, mut map, first, second, _) = apart();
+    fn a_submap_is_removed_with_its_landmarks_and_relative_poses() {
+        let (_, mut map, first, second, _) = two_submaps();
         assert!(map.remove_keyframe(second[2]));
         let landmarks = map.landmarks_of(&first).len();
         map.remove_submap(second[0]);
@@ -200,9 +202,9 @@ mod tests {
     }
 
     #[test]
-    fn a_welded_map_is_read_back_as_one() {
-        let (_, mut map, first, second, other_world) = apart();
-        map.weld(second[3], first[3], &unscaled(&other_world));
+    fn a_merged_map_is_read_as_one_submap() {
+        let (_, mut map, first, second, other_world) = two_submaps();
+        map.merge_submaps(second[3], first[3], &unscaled(&other_world));
         let features = crate::config::FeatureConfig { levels: 1, ..Default::default() };
         let bytes = crate::map::persist::encode(&map, &crate::map::scene::camera(), &features).unwrap();
         let read = crate::map::persist::decode(&bytes).unwrap().map;

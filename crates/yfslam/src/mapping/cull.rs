@@ -1,10 +1,15 @@
-//! What the map can do without (ORB-SLAM, IEEE T-RO 2015, sections VI-B and VI-E).
+//! Culling of recent landmarks and of redundant keyframes (ORB-SLAM, IEEE T-RO 2015, sections VI-B and VI-E).
+//!
+//! In: a new keyframe. Out: the map without unreliable landmarks and redundant keyframes.
 
 use crate::config::MappingConfig;
 use crate::context::Context;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 
-/// Removes young landmarks that are rarely found or seldom observed. Returns those still on probation after `keyframe`.
+/// Number of keyframes after which a landmark must have enough observations (ORB-SLAM, IEEE T-RO 2015, section VI-B).
+const MIN_AGE_KEYFRAMES: u64 = 2;
+
+/// Removes recent landmarks that are rarely matched or have few observations. Returns those that are still recent after `keyframe`.
 pub(super) fn young_landmarks(
     config: &MappingConfig,
     map: &mut Map,
@@ -16,9 +21,10 @@ pub(super) fn young_landmarks(
     for id in young {
         let Some(landmark) = map.landmark(id) else { continue };
         let age = now.saturating_sub(landmark.born);
-        let rarely_found = f64::from(landmark.found) < config.min_found_ratio * f64::from(landmark.visible);
-        let seldom_seen = age >= 2 && map.observation_weight(landmark) < config.min_observation_weight;
-        if rarely_found || seldom_seen {
+        let is_rarely_matched = f64::from(landmark.found) < config.min_found_ratio * f64::from(landmark.visible);
+        let has_few_observations =
+            age >= MIN_AGE_KEYFRAMES && map.observation_weight(landmark) < config.min_observation_weight;
+        if is_rarely_matched || has_few_observations {
             map.remove_landmark(id);
         } else if age < config.probation_keyframes {
             still_young.push(id);
@@ -27,10 +33,9 @@ pub(super) fn young_landmarks(
     still_young
 }
 
-/// Removes covisible keyframes of `keyframe` of whose close landmarks nearly all are seen as finely by enough others. Without depth none
-/// is known to be close, and all count.
+/// Removes the covisible keyframes of `keyframe` that are redundant: enough other keyframes observe nearly all of their close landmarks at
+/// the same or a finer scale. Without depth all landmarks count.
 pub(super) fn redundant_keyframes(context: &Context, map: &mut Map, keyframe: KeyFrameId) {
-    let (_sensor, _config) = (&context.sensor, &context.config.mapping);
     let Some(k) = map.keyframe(keyframe) else { return };
     let candidates: Vec<KeyFrameId> = k.covisible.iter().map(|(id, _)| *id).collect();
     for candidate in candidates {

@@ -1,12 +1,14 @@
-//! Landmarks straight from the depth image (ORB-SLAM2, IEEE T-RO 2017, section III-D).
+//! Landmark creation from measured depth (ORB-SLAM2, IEEE T-RO 2017, section III-D).
+//!
+//! In: a new keyframe. Out: landmarks for its features with depth.
 
 use crate::context::Context;
 use crate::image::RgbImage;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::mapping::color_at;
 
-/// Makes landmarks of the trusted features of `keyframe` that see none: all within the close limit, and the nearest of the others
-/// until `min_depth_landmarks` features with depth were looked at.
+/// Creates landmarks for the static features of `keyframe` that have a depth and no landmark. Features are processed in the order of depth:
+/// all within the close limit, and at least the first `min_depth_landmarks`.
 pub(super) fn new_landmarks(
     context: &Context,
     map: &mut Map,

@@ -1,24 +1,26 @@
-//! Duplicates: landmarks of one keyframe are sought in its neighbours, and joined with what is found there (ORB-SLAM, IEEE T-RO 2015,
-//! section VI-C).
+//! Fusion of duplicate landmarks: the landmarks of a keyframe are projected into its neighbours and merged with matching landmarks
+//! (ORB-SLAM, IEEE T-RO 2015, section VI-C).
+//!
+//! In: a keyframe, or landmarks and a target keyframe. Out: further observations and merged landmarks in the map.
 
 use crate::config::Config;
 use crate::context::Context;
+use crate::geometry::{CHI2_PIXEL, CHI2_PIXEL_DEPTH};
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::optimize::residual::{CHI2_PIXEL, CHI2_PIXEL_DEPTH};
-use crate::tracking::search::{Best, Projector};
+use crate::tracking::search::{BestTwo, MAX_DISTANCE_FACTOR, MIN_DISTANCE_FACTOR, Projector};
 
-/// Joins duplicates between `keyframe` and its first and second neighbours, both ways.
+/// Fuses duplicates between `keyframe` and its first and second neighbours, in both directions.
 pub(crate) fn duplicates(context: &Context, map: &mut Map, keyframe: KeyFrameId) {
     let Context { sensor, config } = context;
-    let targets = neighbourhood(config, map, keyframe);
+    let targets = neighbours(config, map, keyframe);
     for &target in &targets {
         let own = landmarks_of(map, keyframe);
         fuse_into(context, map, target, &own);
     }
-    let mut theirs: Vec<LandmarkId> = targets.iter().flat_map(|&t| landmarks_of(map, t)).collect();
-    theirs.sort_unstable();
-    theirs.dedup();
-    fuse_into(context, map, keyframe, &theirs);
+    let mut of_targets: Vec<LandmarkId> = targets.iter().flat_map(|&t| landmarks_of(map, t)).collect();
+    of_targets.sort_unstable();
+    of_targets.dedup();
+    fuse_into(context, map, keyframe, &of_targets);
     for id in landmarks_of(map, keyframe) {
         map.update_landmark(id, &sensor.scale_factors);
     }
@@ -28,8 +30,8 @@ fn landmarks_of(map: &Map, keyframe: KeyFrameId) -> Vec<LandmarkId> {
     map.keyframe(keyframe).map(|k| k.observed().map(|(_, id)| id).collect()).unwrap_or_default()
 }
 
-/// The best covisible keyframes and the best of each of those.
-fn neighbourhood(config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<KeyFrameId> {
+/// Returns the best covisible keyframes, and the best covisible keyframes of each of these.
+fn neighbours(config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<KeyFrameId> {
     let best = |id: KeyFrameId, n: usize| {
         map.keyframe(id).into_iter().flat_map(move |k| k.covisible.iter().take(n).map(|(id, _)| *id))
     };
@@ -44,7 +46,8 @@ fn neighbourhood(config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<KeyFra
     targets
 }
 
-/// Projects landmarks into `target`: a feature that fits gets the landmark, or its own is merged with it.
+/// Projects landmarks into `target`: a matching feature without landmark gets an observation of it; a matching feature with another
+/// landmark leads to the merging of both.
 pub(crate) fn fuse_into(context: &Context, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
     let Context { sensor, config } = context;
     let Some(k) = map.keyframe(target) else { return };
@@ -55,8 +58,8 @@ pub(crate) fn fuse_into(context: &Context, map: &mut Map, target: KeyFrameId, la
         let Some(projection) = projector.project(&landmark.position) else { continue };
         let ray = landmark.position - projector.center_world;
         let distance = ray.norm();
-        if distance < 0.8 * landmark.min_distance_m
-            || distance > 1.2 * landmark.max_distance_m
+        if distance < MIN_DISTANCE_FACTOR * landmark.min_distance_m
+            || distance > MAX_DISTANCE_FACTOR * landmark.max_distance_m
             || ray.dot(&landmark.normal) < config.tracking.min_view_cosine * distance
             || landmark.feature_in(target).is_some()
         {
@@ -65,13 +68,13 @@ pub(crate) fn fuse_into(context: &Context, map: &mut Map, target: KeyFrameId, la
         let octave = sensor.predict_octave(landmark.max_distance_m, distance);
         let radius = config.mapping.fuse_radius_px * sensor.scale(octave);
         let p = (t_cam_world * landmark.position).coords;
-        let mut best = Best::none();
+        let mut best = BestTwo::new();
         k.features.for_each_near(projection.u, projection.v, radius, octave.saturating_sub(1)..=octave, |j| {
             let f = &k.features.features[j];
             let m = sensor.measurement(f);
             let limit = if m.weight_disparity > 0.0 { CHI2_PIXEL_DEPTH } else { CHI2_PIXEL };
             if f.trust > 0.0 && m.chi2(&m.residual(&sensor.pinhole, &p)) <= limit {
-                best.offer(j, landmark.descriptor.distance(&k.features.descriptors[j]), f.octave);
+                best.add(j, landmark.descriptor.distance(&k.features.descriptors[j]), f.octave);
             }
         });
         if best.distance > config.tracking.hamming_low {

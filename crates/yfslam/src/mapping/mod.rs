@@ -1,7 +1,7 @@
-//! Growth and refinement of the map, one keyframe at a time (ORB-SLAM, IEEE T-RO 2015, section VI).
+//! Local mapping, one keyframe at a time (ORB-SLAM, IEEE T-RO 2015, section VI).
 //!
-//! In: a tracked frame that was found worth keeping. Out: a keyframe in the map with new landmarks, a local bundle adjustment, and
-//! what became superfluous taken away.
+//! In: a tracked frame that becomes a keyframe. Out: the map after keyframe insertion, landmark creation, local bundle adjustment and
+//! culling.
 
 mod cull;
 mod depth;
@@ -15,15 +15,15 @@ use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::tracking::{StartFrame, TrackedFrame, TwoViewMap};
 pub(crate) use window::Window;
 
-/// Grows and refines the map.
+/// Local mapping.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Mapper {
-    /// Landmarks still on probation.
+    /// Recent landmarks, which may still be culled.
     young: Vec<LandmarkId>,
 }
 
 impl Mapper {
-    /// Takes a frame into the map and refines the surroundings. Returns the new keyframe.
+    /// Inserts a frame as a keyframe and refines the map around it. Returns the new keyframe.
     pub(crate) fn insert(
         &mut self,
         context: &Context,
@@ -47,7 +47,7 @@ impl Mapper {
         keyframe
     }
 
-    /// Begins a map, or a submap, with the two frames of a camera without depth. Returns the second keyframe.
+    /// Begins a map or a submap with two frames of a camera without depth. Returns the second keyframe.
     pub(crate) fn begin(&mut self, sensor: &SensorModel, map: &mut Map, start: &TwoViewMap) -> KeyFrameId {
         let [first, second] = [&start.first, &start.second].map(|StartFrame { frame, .. }| {
             map.insert_keyframe(frame.timestamp_ns, frame.t_cam_world, frame.features.clone())
@@ -64,17 +64,17 @@ impl Mapper {
         second
     }
 
-    /// Starts over with an empty list of young landmarks.
+    /// Removes all landmarks from the list of recent ones.
     pub(crate) fn reset(&mut self) {
         self.young.clear();
     }
 
-    /// The keyframe itself, its observations and its landmarks from depth.
+    /// Inserts the keyframe with its observations and the landmarks from its measured depths.
     fn add_keyframe(&mut self, context: &Context, map: &mut Map, frame: &TrackedFrame, color: &RgbImage) -> KeyFrameId {
-        let Context { sensor, config: _ } = context;
+        let sensor = &context.sensor;
         let keyframe = map.insert_keyframe(frame.timestamp_ns, frame.t_cam_world, frame.features.clone());
         for (feature, matched) in frame.matches.iter().enumerate() {
-            if let Some(id) = matched.and_then(|s| s.landmark) {
+            if let Some(id) = matched.and_then(|m| m.landmark) {
                 map.add_observation(id, keyframe, feature);
                 map.update_landmark(id, &sensor.scale_factors);
             }
@@ -85,7 +85,7 @@ impl Mapper {
     }
 }
 
-/// Colour of the pixel at a raw feature position.
+/// Returns the colour of the pixel at a distorted feature position; black outside the image.
 fn color_at(color: &RgbImage, raw: [f32; 2]) -> [u8; 3] {
     color.get((raw[0] + 0.5) as usize, (raw[1] + 0.5) as usize).copied().unwrap_or_default()
 }

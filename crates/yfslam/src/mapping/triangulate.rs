@@ -1,20 +1,22 @@
-//! Landmarks from two views, for features whose depth is missing or far (ORB-SLAM, IEEE T-RO 2015, section VI-C).
+//! Landmark creation by triangulation, for features without depth or beyond the close limit (ORB-SLAM, IEEE T-RO 2015, section VI-C).
+//!
+//! In: a new keyframe and its covisible keyframes. Out: new landmarks with observations in two keyframes.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::context::Context;
 use crate::features::Feature;
-use crate::geometry::{Pose, midpoint, skew};
+use crate::geometry::{CHI2_LINE, CHI2_PIXEL, Pose, midpoint, skew};
 use crate::image::RgbImage;
 use crate::map::{KeyFrame, KeyFrameId, LandmarkId, Map};
 use crate::mapping::color_at;
-use crate::optimize::residual::CHI2_PIXEL;
-use crate::tracking::search::Best;
+use crate::tracking::search::{BestTwo, MIN_DEPTH_M};
 
-/// χ² with one degree of freedom: limit for the distance from the epipolar line.
-const CHI2_LINE: f64 = 3.84;
+/// Tolerance, in pyramid levels' scale factors, of the ratio between distances and scales in two views (scale consistency). Source: ORB-SLAM
+/// (IEEE T-RO 2015, section VI-C), value of ORB-SLAM2.
+const SCALE_TOLERANCE: f64 = 1.5;
 
-/// Matches features without landmark between `keyframe` and its best covisible ones and triangulates them.
+/// Matches features without landmark between `keyframe` and its best covisible keyframes and triangulates the matches.
 pub(super) fn new_landmarks(
     context: &Context,
     map: &mut Map,
@@ -51,12 +53,12 @@ pub(super) fn new_landmarks(
     created
 }
 
-/// Features of a keyframe that may be triangulated: trusted and without landmark.
-fn open_features(k: &KeyFrame) -> Vec<usize> {
+/// Returns the features of a keyframe that may be triangulated: those without landmark and with trust above 0.
+fn unmatched_features(k: &KeyFrame) -> Vec<usize> {
     (0..k.features.len()).filter(|&i| k.landmarks[i].is_none() && k.features.features[i].trust > 0.0).collect()
 }
 
-/// Pairs of feature indices (in a, in b) alike in descriptor and near each other's epipolar line.
+/// Matches features by descriptor near their epipolar line. Returns pairs of feature indices (in a, in b).
 fn match_along_epipolar_lines(context: &Context, a: &KeyFrame, b: &KeyFrame, t_b_a: &Pose) -> Vec<(usize, usize)> {
     let Context { sensor, config } = context;
     let c = &sensor.pinhole;
@@ -64,32 +66,32 @@ fn match_along_epipolar_lines(context: &Context, a: &KeyFrame, b: &KeyFrame, t_b
     let rotation = *t_b_a.rotation.to_rotation_matrix().matrix();
     // x_bᵀ F x_a = 0
     let fundamental = k_inv.transpose() * skew(&t_b_a.translation.vector) * rotation * k_inv;
-    let candidates = open_features(b);
-    let mut taken = vec![false; b.features.len()];
+    let candidates = unmatched_features(b);
+    let mut is_matched = vec![false; b.features.len()];
     let mut matches = Vec::new();
-    for i in open_features(a) {
+    for i in unmatched_features(a) {
         let f = &a.features.features[i];
         let line = fundamental * Vector3::new(f64::from(f.u), f64::from(f.v), 1.0);
         let norm2 = line.x * line.x + line.y * line.y;
-        let mut best = Best::none();
+        let mut best = BestTwo::new();
         for &j in &candidates {
             let g = &b.features.features[j];
             let distance = line.x * f64::from(g.u) + line.y * f64::from(g.v) + line.z;
             let scale = f64::from(sensor.scale(g.octave));
-            if taken[j] || distance * distance > CHI2_LINE * scale * scale * norm2 {
+            if is_matched[j] || distance * distance > CHI2_LINE * scale * scale * norm2 {
                 continue;
             }
-            best.offer(j, a.features.descriptors[i].distance(&b.features.descriptors[j]), 0);
+            best.add(j, a.features.descriptors[i].distance(&b.features.descriptors[j]), 0);
         }
         if best.is_distinct(config.tracking.hamming_low, config.mapping.triangulation_ratio) {
-            taken[best.index] = true;
+            is_matched[best.index] = true;
             matches.push((i, best.index));
         }
     }
     matches
 }
 
-/// The world point of a match, if both views agree on it.
+/// Returns the point of a match in the world; `None` if its reprojection errors or its scales in the two views do not agree.
 fn triangulate(context: &Context, a: &KeyFrame, b: &KeyFrame, i: usize, j: usize) -> Option<Point3<f64>> {
     let Context { sensor, config } = context;
     let (f, g) = (&a.features.features[i], &b.features.features[j]);
@@ -109,13 +111,13 @@ fn triangulate(context: &Context, a: &KeyFrame, b: &KeyFrame, i: usize, j: usize
     for (k, f) in [(a, f), (b, g)] {
         let p = (k.t_cam_world * point).coords;
         let m = sensor.measurement(f);
-        if p.z <= 0.01 || m.chi2(&m.residual(&sensor.pinhole, &p)) > m.chi2_limit().max(CHI2_PIXEL) {
+        if p.z <= MIN_DEPTH_M || m.chi2(&m.residual(&sensor.pinhole, &p)) > m.chi2_limit().max(CHI2_PIXEL) {
             return None;
         }
     }
-    // The ratio of distances must fit the ratio of scales (ORB-SLAM's scale consistency).
+    // Scale consistency: the ratio of the distances must agree with the ratio of the scales.
     let ratio_distance = (point.coords - center_a).norm() / (point.coords - center_b).norm();
     let ratio_scale = f64::from(sensor.scale(f.octave)) / f64::from(sensor.scale(g.octave));
-    let tolerance = 1.5 * f64::from(sensor.scale(1));
+    let tolerance = SCALE_TOLERANCE * f64::from(sensor.scale(1));
     (ratio_distance < ratio_scale * tolerance && ratio_distance * tolerance > ratio_scale).then_some(point)
 }

@@ -1,5 +1,7 @@
-//! Local bundle adjustment (ORB-SLAM2, IEEE T-RO 2017, section III-B): a window is copied out of the map, adjusted, and merged back
-//! where the map still has what was copied.
+//! Local bundle adjustment (ORB-SLAM2, IEEE T-RO 2017, section III-B), and the problem of global bundle adjustment.
+//!
+//! In: a keyframe, or a submap. Out: refined poses and landmarks. The part of the map is copied, adjusted, and written back for all items
+//! that the map still contains, so that the map may change in the meantime.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +10,7 @@ use crate::context::{Context, SensorModel};
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::optimize::schur::{BundleProblem, BundleSummary, Observation};
 
-/// A copied part of the map: keyframes to adjust, all they see, and keyframes that hold it in place.
+/// A copy of a part of the map: keyframes to adjust, their landmarks, and fixed keyframes that observe these, too.
 #[derive(Clone, Debug)]
 pub(crate) struct Window {
     problem: BundleProblem,
@@ -17,13 +19,13 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Copies `keyframe`, its best covisible ones, their landmarks, and the keyframes outside that see most of those.
+    /// Copies `keyframe`, its best covisible keyframes, their landmarks, and as fixed keyframes those others that observe most of them.
     pub(crate) fn copy(context: &Context, map: &Map, keyframe: KeyFrameId) -> Option<Self> {
         let (sensor, config) = (&context.sensor, &context.config.mapping);
         let center = map.keyframe(keyframe)?;
         let mut keyframes = vec![keyframe];
         keyframes.extend(center.covisible.iter().take(config.window_keyframes.saturating_sub(1)).map(|(id, _)| *id));
-        // The root defines the world: it is never adjusted.
+        // The root defines the world frame and is never adjusted.
         keyframes.retain(|id| map.keyframe(*id).is_some_and(|k| k.parent.is_some()));
         let mut landmarks: Vec<LandmarkId> =
             keyframes.iter().filter_map(|id| map.keyframe(*id)).flat_map(|k| k.observed().map(|(_, l)| l)).collect();
@@ -42,11 +44,11 @@ impl Window {
         Some(Self::assemble(sensor, map, keyframes, free_poses, landmarks))
     }
 
-    /// Copies the whole submap with that root; all keyframes but the root are adjusted.
+    /// Copies the whole submap with this root, for global bundle adjustment; all keyframes except the root are adjusted.
     pub(crate) fn whole(sensor: &SensorModel, map: &Map, root: KeyFrameId) -> Self {
         let members = map.submap(root);
         let landmarks = map.landmarks_of(&members);
-        // In the order of time, in which the equations are nearly a band; the root, which stays, goes last.
+        // In the order of time the system is nearly a band matrix. The root is last because it is fixed.
         let mut keyframes: Vec<(bool, u64, KeyFrameId)> =
             members.iter().filter_map(|id| Some((*id == root, map.keyframe(*id)?.sequence, *id))).collect();
         keyframes.sort_unstable();
@@ -55,12 +57,12 @@ impl Window {
         Self::assemble(sensor, map, keyframes, free_poses, landmarks)
     }
 
-    /// The keyframes that were copied.
+    /// Returns the keyframes of the window.
     pub(crate) fn keyframes(&self) -> &[KeyFrameId] {
         &self.keyframes
     }
 
-    /// The landmarks that were copied, in the order of their ids.
+    /// Returns the landmarks of the window, in the order of their ids.
     pub(crate) fn landmarks(&self) -> &[LandmarkId] {
         &self.landmarks
     }
@@ -94,21 +96,21 @@ impl Window {
         Self { problem, keyframes, landmarks }
     }
 
-    /// Adjusts the copy: a few robust steps, outliers out, then more steps.
+    /// Adjusts the copy: some steps with Huber loss, removal of outliers, then more steps without it.
     pub(crate) fn adjust(&mut self, config: &BundleConfig) -> BundleSummary {
         self.adjust_while(config, &|| true)
     }
 
-    /// As [`Window::adjust`], until `go_on` says no, which is asked before each step.
-    pub(crate) fn adjust_while(&mut self, config: &BundleConfig, go_on: &dyn Fn() -> bool) -> BundleSummary {
-        let first = self.problem.solve_while(config, config.first_iterations, true, go_on);
+    /// Adjusts as [`Window::adjust`], but stops when `should_continue`, called before each step, returns false.
+    pub(crate) fn adjust_while(&mut self, config: &BundleConfig, should_continue: &dyn Fn() -> bool) -> BundleSummary {
+        let first = self.problem.solve_while(config, config.first_iterations, true, should_continue);
         self.problem.drop_outliers();
-        let second = self.problem.solve_while(config, config.second_iterations, false, go_on);
+        let second = self.problem.solve_while(config, config.second_iterations, false, should_continue);
         self.problem.drop_outliers();
         BundleSummary { iterations: first.iterations + second.iterations, ..second }
     }
 
-    /// Writes the adjusted poses and points back and takes out observations that did not fit. What the map no longer has is skipped.
+    /// Writes poses and points back to the map and removes outlier observations. Items that the map no longer contains are skipped.
     pub(crate) fn merge(self, sensor: &SensorModel, map: &mut Map) {
         for (id, pose) in self.keyframes.iter().zip(&self.problem.poses).take(self.problem.free_poses) {
             map.set_pose(*id, *pose);

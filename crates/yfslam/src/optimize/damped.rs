@@ -1,17 +1,17 @@
-//! Levenberg-Marquardt for the few parameters of one pose (Madsen, Nielsen and Tingleff, Methods for non-linear least squares problems,
-//! 2004, section 3.2).
+//! The Levenberg–Marquardt method for problems with few parameters, such as one pose (Madsen, Nielsen and Tingleff, Methods for non-linear
+//! least squares problems, 2004, section 3.2).
 //!
-//! In: a first estimate, and what its normal equations are. Out: the estimate refined in place.
+//! In: an initial estimate, and a function that computes the normal equations. Out: the estimate, refined in place.
 
 use nalgebra::{SMatrix, SVector};
 
 use crate::config::PoseOptimizerConfig;
 
-/// Damping beyond which no step is small enough to gain.
+/// Damping above which the iteration ends: no step decreases the cost.
 const MAX_DAMPING: f64 = 1e6;
 
-/// Takes at most `config.iterations` steps from `estimate`. `linearise` gives the normal equations H, b and the cost there; `moved` is the
-/// estimate after a step.
+/// Refines `estimate` by at most `config.iterations` steps. `linearise` returns the normal equations H, b and the cost at an estimate;
+/// `moved` applies a step to an estimate.
 pub(super) fn levenberg_marquardt<T, const N: usize>(
     config: &PoseOptimizerConfig,
     estimate: &mut T,
@@ -28,7 +28,7 @@ pub(super) fn levenberg_marquardt<T, const N: usize>(
         let Some(step) = damped.cholesky().map(|c| c.solve(&b)) else { return };
         let candidate = moved(&step, estimate);
         let (h_new, b_new, cost_new) = linearise(&candidate);
-        // A comparison with NaN is false: a step into nonsense is never taken.
+        // A comparison with NaN is false, so that a step to an invalid cost is rejected.
         if cost_new <= cost {
             let gain = cost - cost_new;
             *estimate = candidate;

@@ -1,7 +1,8 @@
 //! Non-linear least squares over poses and points.
 //!
-//! [`residual`] has the one residual everything shares, [`pose_only`] refines a single pose, [`schur`] adjusts a window of
-//! poses and points together, [`pose_graph`] reconciles poses with motions measured between them, [`similarity`] aligns two maps.
+//! In: initial estimates and measurements. Out: refined estimates. [`residual`] is the reprojection residual of all problems;
+//! [`pose_only`] refines one pose (motion-only bundle adjustment), [`schur`] poses and points together (bundle adjustment), [`pose_graph`]
+//! poses with relative-pose constraints, [`similarity`] the alignment of two maps.
 
 mod damped;
 pub(crate) mod pose_graph;

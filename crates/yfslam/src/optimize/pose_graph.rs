@@ -1,9 +1,9 @@
 //! Pose-graph optimisation over SE(3) (Kümmerle et al., g2o, ICRA 2011; Jacobians after Barfoot, State Estimation for Robotics, section
-//! 7.1) and over Sim(3), where the scale drifts, too (Strasdat, Montiel and Davison, RSS 2010): a loop's error is spread over the poses
-//! between its ends.
+//! 7.1), and over Sim(3) if the scale drifts too (Strasdat, Montiel and Davison, RSS 2010). It distributes the error of a loop over the
+//! poses between its ends.
 //!
-//! In: poses, and motions measured between pairs of them. Out: the poses that fit those best. The normal equations are sparse; they are
-//! solved by sparse Cholesky in the order of the poses, which for a path with few loops fills in little.
+//! In: poses, and relative poses measured between pairs of them. Out: the poses with the least squared error. The sparse normal equations
+//! are solved by sparse Cholesky factorisation in the order of the poses, which causes little fill-in for a path with few loops.
 
 use nalgebra::{DMatrix, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use nalgebra_sparse::factorization::CscCholesky;
@@ -12,34 +12,34 @@ use nalgebra_sparse::{CooMatrix, CscMatrix};
 use crate::config::PoseGraphConfig;
 use crate::geometry::{Similarity, Tangent, TangentMap, sim3_adjoint, sim3_perturbed, sim3_tangent, skew};
 
-/// Parameters of a pose whose scale is known.
+/// Number of parameters of a pose whose scale is known.
 const RIGID: usize = 6;
-/// Parameters of a pose whose scale is not.
+/// Number of parameters of a pose whose scale is unknown.
 const SCALED: usize = 7;
 
-/// A motion measured between two poses.
+/// A relative pose measured between two poses.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Edge {
     /// Index of pose a.
     pub a: usize,
     /// Index of pose b.
     pub b: usize,
-    /// The motion `s_a_b`.
+    /// Measured relative pose.
     pub s_a_b: Similarity,
 }
 
-/// Poses and the motions between them.
+/// Poses and the relative poses measured between them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PoseGraph {
-    /// `s_a_world` of each pose; the first stays where it is.
+    /// `s_cam_world` of each pose; the first is fixed.
     pub poses: Vec<Similarity>,
-    /// Motions measured.
+    /// Measured relative poses.
     pub edges: Vec<Edge>,
 }
 
 impl PoseGraph {
-    /// Minimises the squared errors of all edges by Levenberg-Marquardt; the poses are updated in place. Unless the scale may drift, all
-    /// scales must be 1 and remain so. Returns the cost before and after.
+    /// Minimises the squared errors of all edges by Levenberg–Marquardt and updates the poses in place. Unless `scale_drifts`, all scales
+    /// must be 1 and are not changed. Returns the cost before and after.
     pub(crate) fn solve(&mut self, config: &PoseGraphConfig, scale_drifts: bool) -> (f64, f64) {
         if scale_drifts { self.solve_for::<SCALED>(config) } else { self.solve_for::<RIGID>(config) }
     }
@@ -54,7 +54,7 @@ impl PoseGraph {
                 continue;
             };
             let new = cost::<D>(&candidate, &self.edges);
-            // A comparison with NaN is false: a step into nonsense is never taken.
+            // A comparison with NaN is false, so that a step to an invalid cost is rejected.
             if new <= current {
                 let gain = current - new;
                 self.poses = candidate;
@@ -70,7 +70,7 @@ impl PoseGraph {
         (initial, current)
     }
 
-    /// The poses after one damped Gauss-Newton step in the first `D` parameters of each; `None` if the equations cannot be solved.
+    /// Returns the poses after one damped Gauss–Newton step in the first `D` parameters of each; `None` if the system is singular.
     fn step<const D: usize>(&self, lambda: f64) -> Option<Vec<Similarity>> {
         let n = self.poses.len().checked_sub(1).filter(|n| *n > 0)?;
         let mut diagonal = vec![SMatrix::<f64, D, D>::zeros(); n];
@@ -79,8 +79,8 @@ impl PoseGraph {
         for edge in &self.edges {
             let e = residual(&self.poses, edge);
             let (left, right) = derivatives(&e);
-            let j_a = free::<D>(&left) * free::<D>(&sim3_adjoint(&edge.s_a_b.inverse()));
-            let j_b = -free::<D>(&right);
+            let j_a = leading_block::<D>(&left) * leading_block::<D>(&sim3_adjoint(&edge.s_a_b.inverse()));
+            let j_b = -leading_block::<D>(&right);
             let e = tangent::<D>(&e);
             for (pose, jacobian) in [(edge.a, j_a), (edge.b, j_b)] {
                 if let Some(k) = pose.checked_sub(1) {
@@ -112,7 +112,7 @@ impl PoseGraph {
     }
 }
 
-/// What is left of a measured motion when that of the poses is taken off it.
+/// Returns the difference between the measured relative pose and that of the current poses.
 fn residual(poses: &[Similarity], edge: &Edge) -> Similarity {
     edge.s_a_b.inverse() * poses[edge.a] * poses[edge.b].inverse()
 }
@@ -121,33 +121,33 @@ fn cost<const D: usize>(poses: &[Similarity], edges: &[Edge]) -> f64 {
     edges.iter().map(|edge| tangent::<D>(&residual(poses, edge)).norm_squared()).sum()
 }
 
-/// The first `D` coordinates of a similarity.
+/// Returns the first `D` tangent coordinates of a similarity.
 fn tangent<const D: usize>(s: &Similarity) -> SVector<f64, D> {
     sim3_tangent(s).fixed_rows::<D>(0).into_owned()
 }
 
-/// A map of the first `D` parameters to the first `D`.
-fn free<const D: usize>(map: &TangentMap) -> SMatrix<f64, D, D> {
+/// Returns the block of a linear map that belongs to the first `D` parameters.
+fn leading_block<const D: usize>(map: &TangentMap) -> SMatrix<f64, D, D> {
     map.fixed_view::<D, D>(0, 0).into_owned()
 }
 
-/// How the coordinates of `e` change when it is perturbed from the left, and from the right; exact for the scale, to first order of the
-/// rotation and translation of `e` for those.
+/// Returns the derivatives of the tangent coordinates of `e` with respect to a left and a right perturbation. They are exact in the scale
+/// of `e`, and of first order in its rotation and translation.
 fn derivatives(e: &Similarity) -> (TangentMap, TangentMap) {
     let half = 0.5 * adjoint_algebra(&tangent::<RIGID>(e));
     let (mut left, mut right) = (TangentMap::identity(), TangentMap::identity());
     let rigid_left = Matrix6::identity() - half;
     left.fixed_view_mut::<6, 6>(0, 0).copy_from(&rigid_left);
-    // A scale from the left stretches the translation as well.
+    // A left perturbation of the scale scales the translation, too.
     let stretch = rigid_left.fixed_columns::<3>(0) * e.isometry.translation.vector;
     left.fixed_view_mut::<6, 1>(0, 6).copy_from(&stretch);
     right.fixed_view_mut::<6, 6>(0, 0).copy_from(&(Matrix6::identity() + half));
-    // A translation from the right is stretched.
+    // A right perturbation of the translation is scaled by `e`.
     right.fixed_columns_mut::<3>(0).scale_mut(e.scaling());
     (left, right)
 }
 
-/// The adjoint of a tangent vector of SE(3), the derivative of that of a motion.
+/// Returns the adjoint of a tangent vector of SE(3): the derivative of the adjoint of a motion.
 fn adjoint_algebra(xi: &Vector6<f64>) -> Matrix6<f64> {
     let rho = skew(&Vector3::new(xi[0], xi[1], xi[2]));
     let phi = skew(&Vector3::new(xi[3], xi[4], xi[5]));
@@ -163,8 +163,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Pose, se3_exp, sim3_from_tangent, unscaled};
 
-    /// A walk around a square of four metres, twelve poses a side, looking ahead; and what an odometer with a bias makes of it.
-    fn walk(bias: &Similarity) -> (Vec<Similarity>, PoseGraph) {
+    /// Returns a path around a square of four metres with twelve poses on each side, and its odometry with a bias.
+    fn square_path(bias: &Similarity) -> (Vec<Similarity>, PoseGraph) {
         let step = Pose::translation(0.0, 0.0, -4.0 / 12.0);
         let turn = se3_exp(&Vector6::new(0.0, 0.0, 0.0, 0.0, std::f64::consts::FRAC_PI_2, 0.0));
         let (mut truth, mut graph) = (vec![Similarity::identity()], PoseGraph::default());
@@ -178,28 +178,29 @@ mod tests {
         (truth, graph)
     }
 
-    /// A bias of the motion, and one that makes each length a little longer than the last in the unit of the camera.
+    /// Returns a bias of the motion alone, and one that also increases the scale with each pose.
     fn biases() -> [(Similarity, bool); 2] {
         let rigid = se3_exp(&Vector6::new(0.004, 0.001, 0.002, 0.001, 0.004, -0.002));
         let scale = Similarity::from_scaling(1.01);
         [(unscaled(&rigid), false), (scale * rigid, true)]
     }
 
-    fn farthest(truth: &[Similarity], poses: &[Similarity]) -> f64 {
+    /// Returns the largest distance between true and estimated camera centres.
+    fn largest_error(truth: &[Similarity], poses: &[Similarity]) -> f64 {
         let center = |pose: &Similarity| pose.inverse().isometry.translation.vector;
         truth.iter().zip(poses).map(|(t, p)| (center(t) - center(p)).norm()).fold(0.0, f64::max)
     }
 
     #[test]
-    fn closing_a_loop_takes_most_of_the_drift_away() {
+    fn closing_a_loop_removes_most_of_the_drift() {
         for (bias, scale_drifts) in biases() {
-            let (truth, mut graph) = walk(&bias);
-            let drift = farthest(&truth, &graph.poses);
+            let (truth, mut graph) = square_path(&bias);
+            let drift = largest_error(&truth, &graph.poses);
             graph.edges.push(Edge { a: 47, b: 0, s_a_b: truth[47] * truth[0].inverse() });
             let (before, after) = graph.solve(&PoseGraphConfig::default(), scale_drifts);
             assert!(after < 0.1 * before, "{before} {after}");
-            let left = farthest(&truth, &graph.poses);
-            assert!(drift > 0.5 && left < 0.2 * drift, "{drift} m before, {left} m after");
+            let remaining = largest_error(&truth, &graph.poses);
+            assert!(drift > 0.5 && remaining < 0.2 * drift, "{drift} m before, {remaining} m after");
             if !scale_drifts {
                 assert!(graph.poses.iter().all(|pose| pose.scaling() == 1.0));
             }
@@ -207,15 +208,15 @@ mod tests {
     }
 
     #[test]
-    fn edges_without_contradiction_are_met_exactly_from_a_far_start() {
+    fn consistent_edges_are_fulfilled_from_a_poor_initial_estimate() {
         for (bias, scale_drifts) in biases() {
-            let (truth, mut graph) = walk(&bias);
+            let (truth, mut graph) = square_path(&bias);
             for edge in &mut graph.edges {
                 edge.s_a_b = truth[edge.a] * truth[edge.b].inverse();
             }
             graph.edges.push(Edge { a: 47, b: 0, s_a_b: truth[47] * truth[0].inverse() });
             let (_, after) = graph.solve(&PoseGraphConfig { iterations: 50, ..Default::default() }, scale_drifts);
-            assert!(after < 1e-16 && farthest(&truth, &graph.poses) < 1e-7, "{after}");
+            assert!(after < 1e-16 && largest_error(&truth, &graph.poses) < 1e-7, "{after}");
         }
     }
 
@@ -229,14 +230,14 @@ mod tests {
             let numeric = |f: &dyn Fn(&Tangent) -> Similarity| (sim3_tangent(&f(&xi)) - sim3_tangent(&f(&-xi))) / 2e-5;
             let by_left = numeric(&|xi| sim3_from_tangent(xi) * e);
             let by_right = numeric(&|xi| e * sim3_from_tangent(xi));
-            // What the first order leaves out is of the square of the motion: 1e-3 of a turn of 0.03.
+            // The neglected second order is about 1e-3 for a rotation of 0.03.
             assert!((by_left - left.column(axis)).norm() < 1e-3, "axis {axis}: {by_left}");
             assert!((by_right - right.column(axis)).norm() < 1e-3, "axis {axis}: {by_right}");
         }
     }
 
     #[test]
-    fn a_graph_of_one_pose_stays_as_it_is() {
+    fn a_graph_of_one_pose_is_not_changed() {
         let mut graph = PoseGraph { poses: vec![Similarity::identity()], edges: Vec::new() };
         assert_eq!(graph.solve(&PoseGraphConfig::default(), false), (0.0, 0.0));
         assert_eq!(graph.poses, [Similarity::identity()]);

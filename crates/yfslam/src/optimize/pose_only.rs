@@ -1,6 +1,6 @@
 //! Motion-only bundle adjustment: the pose of one frame from landmarks that stay fixed (ORB-SLAM2, IEEE T-RO 2017, section III-B).
 //!
-//! In: a first pose, points in the world and their measurements. Out: the pose and which measurements fit it.
+//! In: an initial pose, landmarks and their measurements. Out: the refined pose, and which measurements are inliers.
 
 use nalgebra::{Matrix6, Point3, Vector3, Vector6};
 
@@ -9,23 +9,23 @@ use crate::geometry::{Pinhole, Pose, perturbed};
 use crate::optimize::damped::levenberg_marquardt;
 use crate::optimize::residual::{Measurement, huber, projection_jacobian};
 
-/// A landmark seen in the frame whose pose is wanted.
+/// Observation of a landmark in the frame whose pose is estimated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PoseObservation {
-    /// The landmark in the world, m.
+    /// Landmark in the world, m.
     pub point_world: Point3<f64>,
-    /// Where it was seen.
+    /// Measured position and disparity.
     pub measurement: Measurement,
-    /// How far it may be trusted, in [0, 1]; scales the information.
+    /// Static probability, in [0, 1]; scales the information matrix.
     pub trust: f64,
-    /// Set by the optimiser: whether the observation fits the pose.
+    /// Whether the observation is an inlier; set by the optimiser.
     pub inlier: bool,
 }
 
 /// Refines `t_cam_world` in place and marks the inliers among `observations`; returns their number.
 ///
-/// Each round starts from the observations that fitted the last; the robust kernel is dropped after
-/// `robust_rounds`, when the gross errors are gone.
+/// Each round uses the inliers of the round before. After `robust_rounds` the Huber loss is replaced by the squared loss, because the
+/// gross errors have been removed.
 pub(crate) fn optimize_pose(
     camera: &Pinhole,
     config: &PoseOptimizerConfig,
@@ -48,7 +48,7 @@ pub(crate) fn optimize_pose(
 }
 
 /// Returns the covariance of a left perturbation (translation m, rotation rad) of `t_cam_world` that follows from the noise of the
-/// inliers, landmarks taken as exact; `None` where the inliers leave a direction open.
+/// inliers; landmarks are taken as exact. `None` if the inliers do not determine all directions.
 pub(crate) fn pose_covariance(
     camera: &Pinhole,
     t_cam_world: &Pose,
@@ -58,15 +58,15 @@ pub(crate) fn pose_covariance(
     h.try_inverse().filter(|covariance| covariance.diagonal().iter().all(|variance| *variance >= 0.0))
 }
 
-/// Returns the standard deviation of the camera's position at `t_cam_world`, m; infinite where the inliers leave it open.
+/// Returns the standard deviation of the camera position at `t_cam_world`, m; infinite if the inliers do not determine it.
 pub(crate) fn position_sigma_m(camera: &Pinhole, t_cam_world: &Pose, observations: &[PoseObservation]) -> f64 {
     let (h, ..) = linearise(camera, false, t_cam_world, observations);
-    // A left perturbation moves the camera by its translation part.
+    // The translation part of a left perturbation is the motion of the camera centre.
     let covariance = h.try_inverse().map(|inverse| inverse.fixed_view::<3, 3>(0, 0).trace());
     covariance.filter(|variance| *variance >= 0.0).map_or(f64::INFINITY, f64::sqrt)
 }
 
-/// Normal equations H, b and the robust cost at `pose`, over the inliers.
+/// Computes the normal equations H, b and the robust cost at `pose` from the inliers.
 fn linearise(
     camera: &Pinhole,
     robust: bool,
@@ -75,7 +75,7 @@ fn linearise(
 ) -> (Matrix6<f64>, Vector6<f64>, f64) {
     let rotation = pose.rotation.to_rotation_matrix();
     let translation = pose.translation.vector;
-    // Upper triangle of H, row-wise: 21 running sums stay in registers where a Matrix6 would go through memory.
+    // Only the upper triangle of H, row by row: its 21 sums stay in registers, while a Matrix6 would be kept in memory.
     let mut h = [0.0f64; 21];
     let mut b = [0.0f64; 6];
     let mut cost = 0.0;
@@ -91,7 +91,7 @@ fn linearise(
         cost += o.trust * loss;
         let j = projection_jacobian(camera, &p);
         let info = o.measurement.information() * (weight * o.trust);
-        // d p / d(ρ, φ) = [I | −[p]×], hence each row a of J extends to (a, p × a).
+        // d p / d(ρ, φ) = [I | −[p]×], so that each row a of J becomes (a, p × a).
         for k in 0..3 {
             let a = Vector3::new(j[(k, 0)], j[(k, 1)], j[(k, 2)]);
             let c = p.cross(&a);
@@ -120,7 +120,7 @@ fn linearise(
     (full, Vector6::from_row_slice(&b), cost)
 }
 
-/// Marks each observation by the χ² test at `pose`; returns the number of inliers.
+/// Marks inliers by the χ² test at `pose` and returns their number.
 fn classify(camera: &Pinhole, pose: &Pose, observations: &mut [PoseObservation]) -> usize {
     let rotation = pose.rotation.to_rotation_matrix();
     let translation = pose.translation.vector;
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pose_is_recovered_from_a_far_start_despite_outliers() {
+    fn the_pose_is_recovered_from_a_poor_initial_estimate_despite_outliers() {
         let camera = Pinhole { fx: 520.0, fy: 510.0, cx: 320.0, cy: 240.0, bf: 40.0 };
         let truth = se3_exp(&Vector6::new(0.3, -0.2, 0.1, 0.05, -0.4, 0.2));
         let mut observations = observations(&camera, &truth);
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn the_position_is_the_less_certain_the_farther_and_fewer_the_points() {
+    fn the_position_is_less_certain_with_far_and_with_few_points() {
         let camera = Pinhole { fx: 520.0, fy: 510.0, cx: 320.0, cy: 240.0, bf: 40.0 };
         let pose = Pose::translation(0.1, 0.0, 0.2);
         let near = observations(&camera, &pose);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_distrusted_observation_does_not_move_the_pose() {
+    fn an_observation_with_trust_zero_does_not_change_the_pose() {
         let camera = Pinhole { fx: 520.0, fy: 510.0, cx: 320.0, cy: 240.0, bf: 40.0 };
         let truth = Pose::translation(0.1, 0.0, 0.2);
         let mut observations = observations(&camera, &truth);

@@ -1,26 +1,21 @@
-//! The reprojection residual of an RGB-D feature and its Huber weight.
+//! The reprojection residual of a feature with or without depth, and its Huber weight.
 //!
-//! In: a point in the camera frame and what was measured. Out: (Δu, Δv, Δdisparity), its Jacobian and χ².
-//! ORB-SLAM2 (IEEE T-RO 2017, section III-B) compares (u, v, u_R); here the disparity `bf / z` stands in the place of u_R, so
-//! that the noise of the corner and that of the depth sensor are independent and weighted on their own.
+//! In: a point in the camera frame and its measurement. Out: (Δu, Δv, Δdisparity), its Jacobian and χ².
+//! ORB-SLAM2 (IEEE T-RO 2017, section III-B) uses (u, v, u_R). Here the disparity `bf / z` replaces u_R, because the noise of the position
+//! and the noise of the depth sensor are then independent and have separate weights.
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::geometry::Pinhole;
+use crate::geometry::{CHI2_PIXEL, CHI2_PIXEL_DEPTH, Pinhole};
 
-/// 95 % quantile of χ² with two degrees of freedom: limit for features without depth.
-pub(crate) const CHI2_PIXEL: f64 = 5.991;
-/// 95 % quantile of χ² with three degrees of freedom: limit for features with depth.
-pub(crate) const CHI2_PIXEL_DEPTH: f64 = 7.815;
-
-/// What was measured of a point in one image.
+/// Measurement of a point in one image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Measurement {
     /// Undistorted column, px.
     pub u: f64,
     /// Undistorted row, px.
     pub v: f64,
-    /// `bf / depth`, px; meaningless if `weight_disparity` is 0.
+    /// `bf / depth`, px; unused if `weight_disparity` is 0.
     pub disparity: f64,
     /// 1/σ² of u and v, px⁻².
     pub weight_px: f64,
@@ -29,33 +24,33 @@ pub(crate) struct Measurement {
 }
 
 impl Measurement {
-    /// The χ² limit that suits the number of components measured.
+    /// Returns the χ² limit for the number of measured quantities.
     #[inline]
     pub(crate) fn chi2_limit(&self) -> f64 {
         if self.weight_disparity > 0.0 { CHI2_PIXEL_DEPTH } else { CHI2_PIXEL }
     }
 
-    /// Measured minus predicted for the point `p` in the camera frame.
+    /// Returns the measurement minus its prediction for the point `p` of the camera frame.
     #[inline]
     pub(crate) fn residual(&self, camera: &Pinhole, p: &Vector3<f64>) -> Vector3<f64> {
         let [u, v] = camera.project(p);
         Vector3::new(self.u - u, self.v - v, self.disparity - camera.bf / p.z)
     }
 
-    /// Squared Mahalanobis norm of a residual.
+    /// Returns the squared Mahalanobis norm of a residual.
     #[inline]
     pub(crate) fn chi2(&self, r: &Vector3<f64>) -> f64 {
         (r.x * r.x + r.y * r.y) * self.weight_px + r.z * r.z * self.weight_disparity
     }
 
-    /// The diagonal of the information matrix.
+    /// Returns the diagonal of the information matrix.
     #[inline]
     pub(crate) fn information(&self) -> Vector3<f64> {
         Vector3::new(self.weight_px, self.weight_px, self.weight_disparity)
     }
 }
 
-/// Jacobian of (û, v̂, bf/ẑ) by the point in the camera frame.
+/// Computes the Jacobian of (û, v̂, bf/ẑ) with respect to the point in the camera frame.
 #[inline]
 pub(crate) fn projection_jacobian(camera: &Pinhole, p: &Vector3<f64>) -> Matrix3<f64> {
     let iz = 1.0 / p.z;
@@ -73,7 +68,7 @@ pub(crate) fn projection_jacobian(camera: &Pinhole, p: &Vector3<f64>) -> Matrix3
     )
 }
 
-/// Huber's loss of χ² with the limit given as χ²: (cost, weight of the residual).
+/// Returns the Huber loss of χ² and the weight of the residual; the limit between squared and linear loss is given as χ².
 #[inline]
 pub(crate) fn huber(chi2: f64, limit: f64) -> (f64, f64) {
     if chi2 <= limit {

@@ -1,8 +1,8 @@
 //! Bundle adjustment by Levenberg–Marquardt with the Schur complement (Triggs et al., Bundle Adjustment: a Modern Synthesis,
 //! 2000, section 6.1).
 //!
-//! In: a copied window of poses, points and observations. Out: the same, refined. Points are eliminated first; what is left
-//! is a symmetric system over the free poses, six unknowns each, for dense Cholesky or, if they are many, sparse.
+//! In: a copy of a part of the map: poses, points and observations. Out: refined poses and points. The points are eliminated first. The
+//! reduced symmetric system has six unknowns for each free pose; it is solved by Cholesky factorisation, dense or, if large, sparse.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
 use nalgebra_sparse::CscMatrix;
@@ -14,27 +14,27 @@ use crate::optimize::residual::{Measurement, huber, projection_jacobian};
 
 type Matrix6x3 = SMatrix<f64, 6, 3>;
 
-/// One matched of a point from a pose.
+/// Observation of a point from a pose.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Observation {
     /// Index into [`BundleProblem::poses`].
     pub pose: usize,
     /// Index into [`BundleProblem::points`].
     pub point: usize,
-    /// What was measured.
+    /// Measured position and disparity.
     pub measurement: Measurement,
-    /// How far it may be trusted, in [0, 1]; 0 takes it out.
+    /// Static probability, in [0, 1]; an observation with 0 is ignored.
     pub trust: f64,
 }
 
-/// A window of the map, copied, to be adjusted.
+/// A bundle adjustment problem: a copy of a part of the map.
 #[derive(Clone, Debug)]
 pub(crate) struct BundleProblem {
-    /// The camera all poses share.
+    /// Camera of all poses.
     pub camera: Pinhole,
-    /// `t_cam_world` of each keyframe; the first `free_poses` are adjusted, the others hold the window in place.
+    /// `t_cam_world` of each keyframe; the first `free_poses` are adjusted, the others are fixed.
     pub poses: Vec<Pose>,
-    /// How many of `poses` are adjusted.
+    /// Number of poses that are adjusted.
     pub free_poses: usize,
     /// Landmarks in the world, m.
     pub points: Vec<Point3<f64>>,
@@ -42,7 +42,7 @@ pub(crate) struct BundleProblem {
     pub observations: Vec<Observation>,
 }
 
-/// How an adjustment went.
+/// Result of a bundle adjustment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct BundleSummary {
     /// Steps taken.
@@ -54,18 +54,18 @@ pub(crate) struct BundleSummary {
 }
 
 impl BundleProblem {
-    /// Minimises the robust cost by at most `iterations` steps; poses and points are updated in place.
+    /// Minimises the cost by at most `iterations` steps, with Huber loss if `robust`. Poses and points are updated in place.
     pub(crate) fn solve(&mut self, config: &BundleConfig, iterations: usize, robust: bool) -> BundleSummary {
         self.solve_while(config, iterations, robust, &|| true)
     }
 
-    /// As [`BundleProblem::solve`], until `go_on` says no, which is asked before each step.
+    /// Minimises as [`BundleProblem::solve`], but stops when `should_continue`, called before each step, returns false.
     pub(crate) fn solve_while(
         &mut self,
         config: &BundleConfig,
         iterations: usize,
         robust: bool,
-        go_on: &dyn Fn() -> bool,
+        should_continue: &dyn Fn() -> bool,
     ) -> BundleSummary {
         debug_assert!(self.observations.is_sorted_by_key(|o| o.point));
         let mut system = NormalEquations::new(self);
@@ -74,7 +74,7 @@ impl BundleProblem {
         let mut lambda = config.initial_damping;
         let mut stale = true;
         for _ in 0..iterations {
-            if !go_on() {
+            if !should_continue() {
                 break;
             }
             if stale {
@@ -89,7 +89,7 @@ impl BundleProblem {
                 (std::mem::replace(&mut self.poses, candidate.0), std::mem::replace(&mut self.points, candidate.1));
             let new_cost = self.cost(robust);
             summary.iterations += 1;
-            // A comparison with NaN is false: a step into nonsense is never kept.
+            // A comparison with NaN is false, so that a step to an invalid cost is rejected.
             if new_cost <= cost {
                 let gain = cost - new_cost;
                 cost = new_cost;
@@ -108,31 +108,31 @@ impl BundleProblem {
         summary
     }
 
-    /// Standard deviation of the first camera's place as seen from the second, as a share of the distance between them: how well two views
-    /// tell the direction of their motion, going by the noise of what they see. Their scale, which they leave open, is taken as known.
-    /// Infinite for anything but two poses of which one is free.
+    /// Returns the standard deviation of the position of the free camera relative to the fixed one, divided by their distance: the
+    /// uncertainty of the direction of the baseline, rad, that follows from the noise of the measurements. The scale, which two views do
+    /// not determine, is taken as known. Infinite unless the problem has two poses of which one is free.
     pub(crate) fn two_view_sigma(&self) -> f64 {
         let ([pose, fixed], 1) = (self.poses.as_slice(), self.free_poses) else { return f64::INFINITY };
         let mut system = NormalEquations::new(self);
         system.linearise(self, false);
         system.reduce(self, 0.0);
         let mut information: Matrix6<f64> = system.reduced.fixed_view::<6, 6>(0, 0).into();
-        // A left perturbation moves the camera by its translation part.
+        // The translation part of a left perturbation is the motion of the camera centre.
         let baseline = (pose * fixed.inverse()).translation.vector;
         let along = baseline.normalize();
         let mut block = information.fixed_view_mut::<3, 3>(0, 0);
-        let certain = 1e3 * block.norm();
-        block += along * along.transpose() * certain;
+        let known_scale = 1e3 * block.norm();
+        block += along * along.transpose() * known_scale;
         let covariance = information.try_inverse().map(|inverse| inverse.fixed_view::<3, 3>(0, 0).trace());
         covariance.filter(|v| *v >= 0.0).map_or(f64::INFINITY, |variance| variance.sqrt() / baseline.norm())
     }
 
-    /// The point of observation `o` in its camera's frame.
+    /// Returns the point of observation `o` in the frame of its camera.
     fn point_in_camera(&self, o: &Observation) -> Vector3<f64> {
         (self.poses[o.pose] * self.points[o.point]).coords
     }
 
-    /// Sum of the robust losses. A point behind its camera costs its χ² limit.
+    /// Returns the sum of the losses. A point behind its camera costs its χ² limit.
     fn cost(&self, robust: bool) -> f64 {
         let mut sum = 0.0;
         for o in self.observations.iter().filter(|o| o.trust > 0.0) {
@@ -148,7 +148,7 @@ impl BundleProblem {
         sum
     }
 
-    /// Sets the trust of observations that fail the χ² test, or lie behind their camera, to 0; returns how many failed.
+    /// Sets the trust of observations to 0 if they fail the χ² test or lie behind their camera. Returns their number.
     pub(crate) fn drop_outliers(&mut self) -> usize {
         let mut dropped = 0;
         for i in 0..self.observations.len() {
@@ -164,21 +164,21 @@ impl BundleProblem {
     }
 }
 
-/// Closer than this a point has no usable projection, m.
+/// Least depth of a point with a usable projection, m.
 const MIN_DEPTH_M: f64 = 1e-3;
 
-/// Unknowns of the reduced system up to which it is solved as a dense one.
+/// Number of unknowns of the reduced system up to which it is solved as a dense system.
 const DENSE_LIMIT: usize = 600;
 
-/// The blocks of JᵀWJ and JᵀWr, and scratch for the reduced system.
+/// Blocks of JᵀWJ and JᵀWr, and buffers for the reduced system.
 struct NormalEquations {
     pose_blocks: Vec<Matrix6<f64>>,
     pose_rhs: Vec<Vector6<f64>>,
     point_blocks: Vec<Matrix3<f64>>,
     point_rhs: Vec<Vector3<f64>>,
-    /// Coupling of pose and point, one block per observation.
+    /// Block of pose and point of each observation.
     coupling: Vec<Matrix6x3>,
-    /// `observations[point_start[i]..point_start[i + 1]]` see point i.
+    /// Start of the observations of each point: those of point i are `point_start[i]..point_start[i + 1]`.
     point_start: Vec<usize>,
     reduced: DMatrix<f64>,
     reduced_rhs: DVector<f64>,
@@ -208,6 +208,7 @@ impl NormalEquations {
         }
     }
 
+    /// Computes all blocks at the current poses and points.
     fn linearise(&mut self, problem: &BundleProblem, robust: bool) {
         self.pose_blocks.fill(Matrix6::zeros());
         self.pose_rhs.fill(Vector6::zeros());
@@ -249,7 +250,8 @@ impl NormalEquations {
         }
     }
 
-    /// The poses' part of the step. Few poses see points of each other almost all, many do not: above a limit the zeros pay.
+    /// Solves the reduced system for the step of the poses; `None` if it is not positive definite. In a small window almost all poses share
+    /// points, so that the system is dense; in a large one it is sparse.
     fn solve_reduced(&mut self) -> Option<DVector<f64>> {
         let size = self.reduced_rhs.len();
         if size == 0 {
@@ -264,7 +266,7 @@ impl NormalEquations {
         Some(factor.solve(&self.reduced_rhs).column(0).into_owned())
     }
 
-    /// Eliminates the points from the damped system. Returns the inverses of their blocks.
+    /// Eliminates the points from the damped system (Schur complement). Returns the inverses of their blocks.
     fn reduce(&mut self, problem: &BundleProblem, lambda: f64) -> Vec<Matrix3<f64>> {
         let n = problem.free_poses;
         self.reduced.fill(0.0);
@@ -282,7 +284,7 @@ impl NormalEquations {
             for i in 0..3 {
                 h[(i, i)] += lambda * h[(i, i)] + 1e-9;
             }
-            // A point that nothing determines stays where it is: its inverse stays zero.
+            // A point that is not determined by its observations is not moved: its inverse stays zero.
             let Some(inverted) = h.try_inverse() else { continue };
             *inverse = inverted;
             let range = self.point_start[point]..self.point_start[point + 1];
@@ -310,7 +312,7 @@ impl NormalEquations {
         inverses
     }
 
-    /// Solves the damped system; `None` if it is not positive definite.
+    /// Returns poses and points after a damped step; `None` if the system is not positive definite.
     fn step(&mut self, problem: &BundleProblem, lambda: f64) -> Option<(Vec<Pose>, Vec<Point3<f64>>)> {
         let n = problem.free_poses;
         let inverses = self.reduce(problem, lambda);
@@ -339,6 +341,7 @@ mod tests {
     use super::*;
     use crate::geometry::se3_exp;
 
+    /// Returns a problem with exact poses and points, and the same problem with perturbed ones.
     fn scene(noise: f64) -> (BundleProblem, BundleProblem) {
         let camera = Pinhole { fx: 520.0, fy: 520.0, cx: 320.0, cy: 240.0, bf: 40.0 };
         let poses: Vec<Pose> = (0..6)
@@ -368,7 +371,7 @@ mod tests {
                 });
             }
         }
-        // The free poses come first: reverse, so that the two fixed ones are poses 4 and 5.
+        // Poses 4 and 5 are fixed.
         let truth = BundleProblem { camera, poses, free_poses: 4, points, observations };
         let mut perturbed = truth.clone();
         for (k, pose) in perturbed.poses.iter_mut().take(4).enumerate() {
@@ -383,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn adjustment_recovers_exact_poses_and_points() {
+    fn bundle_adjustment_recovers_exact_poses_and_points() {
         let (truth, mut problem) = scene(0.02);
         let summary = problem.solve(&BundleConfig::default(), 30, true);
         assert!(summary.final_cost < 1e-9 * summary.initial_cost, "{summary:?}");
@@ -396,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn gross_errors_are_dropped_and_do_not_bend_the_result() {
+    fn gross_errors_are_removed_and_do_not_change_the_result() {
         let (truth, mut problem) = scene(0.005);
         for o in problem.observations.iter_mut().step_by(41) {
             o.measurement.u += 60.0;
@@ -411,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn many_poses_are_solved_for_as_few_are() {
+    fn the_sparse_solver_solves_the_reduced_system() {
         let poses = vec![Pose::identity(); DENSE_LIMIT / 6 + 1];
         let (camera, free_poses) = (scene(0.0).0.camera, poses.len());
         let mut system = NormalEquations::new(&BundleProblem {
@@ -436,7 +439,7 @@ mod tests {
     }
 
     #[test]
-    fn fixed_poses_stay() {
+    fn fixed_poses_are_not_changed() {
         let (_, mut problem) = scene(0.02);
         let before = problem.poses[4..].to_vec();
         problem.solve(&BundleConfig::default(), 10, true);

@@ -1,7 +1,7 @@
-//! The similarity between two maps of the same points, from what their cameras saw (ORB-SLAM, IEEE T-RO 2015, section VII-B): each point
-//! of one map must be where a camera of the other one saw it, both ways.
+//! The similarity between two maps of the same points (ORB-SLAM, IEEE T-RO 2015, section VII-B): it minimises the reprojection errors of
+//! the points of each map in a camera of the other map.
 //!
-//! In: a first similarity, points of both maps and their measurements. Out: the similarity, and which pairs of points fit it.
+//! In: an initial similarity, points of both maps and their measurements. Out: the refined similarity, and which pairs of points are inliers.
 
 use nalgebra::{Matrix3, Point3, SMatrix, Vector3};
 
@@ -10,59 +10,59 @@ use crate::geometry::{Pinhole, Pose, Similarity, Tangent, TangentMap, sim3_pertu
 use crate::optimize::damped::levenberg_marquardt;
 use crate::optimize::residual::{Measurement, huber, projection_jacobian};
 
-/// Limit of χ² with two degrees of freedom up to which a point fits: its 99 % quantile. Source: ORB-SLAM2.
+/// Limit of χ² for an inlier: the 99 % quantile with two degrees of freedom. Source: ORB-SLAM2.
 const CHI2_LIMIT: f64 = 9.210;
-/// Least depth of a point that a camera can see.
+/// Least depth of a point with a usable projection, in the unit of the map.
 const MIN_DEPTH: f64 = 1e-3;
 
-/// A point as two maps have it, a and b, each in its own unit of length.
+/// A point in two maps, a and b, each with its own unit of length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Correspondence {
-    /// The point of a, in a camera that belongs to a.
+    /// Point of map a, in the frame of a camera of a.
     pub in_a: Point3<f64>,
-    /// What that camera saw of it.
+    /// Measurement of the point in that camera.
     pub seen_in_a: Measurement,
-    /// The point of b, in the frame that is to be aligned with the camera of a.
+    /// Point of map b, in the frame that is aligned with the camera of a.
     pub in_b: Point3<f64>,
-    /// From there into a camera that belongs to b.
+    /// Pose of a camera of b relative to that frame.
     pub t_view_b: Pose,
-    /// What that camera saw of it.
+    /// Measurement of the point in the camera of b.
     pub seen_in_b: Measurement,
-    /// Set by the optimiser: whether the pair fits the similarity.
+    /// Whether the pair is an inlier; set by the optimiser.
     pub inlier: bool,
 }
 
 impl Correspondence {
-    /// Whether each point, brought over by `s_b_a`, is where the other map's camera saw it.
+    /// Returns whether each point projects to its measured position in the camera of the other map.
     pub(crate) fn fits(&self, camera: &Pinhole, s_b_a: &Similarity) -> bool {
-        self.views(s_b_a, &s_b_a.inverse()).iter().all(|view| {
+        self.projections(s_b_a, &s_b_a.inverse()).iter().all(|view| {
             let m = &view.measurement;
             view.point.z > MIN_DEPTH && m.chi2(&m.residual(camera, &view.point)) <= CHI2_LIMIT
         })
     }
 
-    /// The point of a in the camera of b, and the reverse; with the derivative by a left perturbation of `s_b_a`.
-    fn views(&self, s_b_a: &Similarity, s_a_b: &Similarity) -> [View; 2] {
+    /// Returns the point of a in the camera of b and the reverse, with derivatives with respect to a left perturbation of `s_b_a`.
+    fn projections(&self, s_b_a: &Similarity, s_a_b: &Similarity) -> [View; 2] {
         let moved = s_b_a * self.in_a;
         let rotation = |pose: &Pose| *pose.rotation.to_rotation_matrix().matrix();
-        let forth = rotation(&self.t_view_b) * by_perturbation(&moved.coords);
-        // What is perturbed from the left is undone by the opposite from the right.
-        let back = -(rotation(&s_a_b.isometry) * s_a_b.scaling()) * by_perturbation(&self.in_b.coords);
+        let forward = rotation(&self.t_view_b) * by_perturbation(&moved.coords);
+        // A left perturbation of `s_b_a` is the opposite right perturbation of its inverse.
+        let backward = -(rotation(&s_a_b.isometry) * s_a_b.scaling()) * by_perturbation(&self.in_b.coords);
         [
-            View { point: (self.t_view_b * moved).coords, jacobian: forth, measurement: self.seen_in_b },
-            View { point: (s_a_b * self.in_b).coords, jacobian: back, measurement: self.seen_in_a },
+            View { point: (self.t_view_b * moved).coords, jacobian: forward, measurement: self.seen_in_b },
+            View { point: (s_a_b * self.in_b).coords, jacobian: backward, measurement: self.seen_in_a },
         ]
     }
 }
 
-/// A point in a camera.
+/// A point in the frame of a camera, its derivative and its measurement.
 struct View {
     point: Vector3<f64>,
     jacobian: SMatrix<f64, 3, 7>,
     measurement: Measurement,
 }
 
-/// How a point moves when it is perturbed: ρ + φ × p + σ p.
+/// Returns the derivative of a point with respect to a perturbation: ρ + φ × p + σ p.
 fn by_perturbation(p: &Vector3<f64>) -> SMatrix<f64, 3, 7> {
     let mut jacobian = SMatrix::<f64, 3, 7>::zeros();
     jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
@@ -71,7 +71,7 @@ fn by_perturbation(p: &Vector3<f64>) -> SMatrix<f64, 3, 7> {
     jacobian
 }
 
-/// Refines `s_b_a` in place and marks the inliers; returns their number. Rounds are those of [`super::pose_only::optimize_pose`].
+/// Refines `s_b_a` in place and marks the inliers; returns their number. Rounds are as in [`super::pose_only::optimize_pose`].
 pub(crate) fn optimize_similarity(
     camera: &Pinhole,
     config: &PoseOptimizerConfig,
@@ -94,7 +94,7 @@ pub(crate) fn optimize_similarity(
     inliers
 }
 
-/// Normal equations H, b and the robust cost, over the inliers.
+/// Computes the normal equations H, b and the robust cost from the inliers.
 fn linearise(
     camera: &Pinhole,
     robust: bool,
@@ -103,7 +103,7 @@ fn linearise(
 ) -> (TangentMap, Tangent, f64) {
     let (mut h, mut b, mut cost) = (TangentMap::zeros(), Tangent::zeros(), 0.0);
     let s_a_b = s_b_a.inverse();
-    for view in correspondences.iter().filter(|c| c.inlier).flat_map(|c| c.views(s_b_a, &s_a_b)) {
+    for view in correspondences.iter().filter(|c| c.inlier).flat_map(|c| c.projections(s_b_a, &s_a_b)) {
         if view.point.z <= MIN_DEPTH {
             cost += CHI2_LIMIT;
             continue;
@@ -134,14 +134,14 @@ mod tests {
         Measurement { u, v, weight_px: 1.0, ..Default::default() }
     }
 
-    /// Points of a, as b has them by `s_b_a`; every eighth of b is somewhere else.
+    /// Returns points of a and their images in b under `s_b_a`; every eighth is an outlier.
     fn pairs(s_b_a: &Similarity) -> Vec<Correspondence> {
         let t_view_b = se3_exp(&Vector6::new(0.2, -0.1, 0.05, 0.02, -0.03, 0.01));
         let pair = |i: usize| {
             let in_a =
                 Point3::new(0.2 * (i % 7) as f64 - 0.6, 0.15 * (i % 5) as f64 - 0.3, 2.0 + 0.3 * ((i * 5) % 9) as f64);
-            let elsewhere = if i.is_multiple_of(8) { Vector3::new(0.9, -0.7, 0.4) } else { Vector3::zeros() };
-            let in_b = s_b_a * in_a + elsewhere;
+            let offset = if i.is_multiple_of(8) { Vector3::new(0.9, -0.7, 0.4) } else { Vector3::zeros() };
+            let in_b = s_b_a * in_a + offset;
             let seen_in_b = measured(&(t_view_b * in_b));
             Correspondence { in_a, seen_in_a: measured(&in_a), in_b, t_view_b, seen_in_b, inlier: false }
         };
@@ -150,7 +150,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_similarity_is_found_from_nearby_and_wrong_pairs_are_told(
+        fn the_similarity_is_recovered_and_outliers_are_marked(
             v in prop::array::uniform6(-0.1f64..0.1), sigma in -1.0f64..1.0, w in prop::array::uniform7(-0.002f64..0.002),
         ) {
             let truth = sim3_from_tangent(&Vector6::from_row_slice(&v).push(sigma));
@@ -172,9 +172,9 @@ mod tests {
             xi[axis] = 1e-6;
             let at = |xi: &Tangent| {
                 let moved = sim3_perturbed(xi, &s);
-                pair.views(&moved, &moved.inverse()).map(|view| view.point)
+                pair.projections(&moved, &moved.inverse()).map(|view| view.point)
             };
-            let (plus, minus, views) = (at(&xi), at(&-xi), pair.views(&s, &s.inverse()));
+            let (plus, minus, views) = (at(&xi), at(&-xi), pair.projections(&s, &s.inverse()));
             for side in 0..2 {
                 let numeric = (plus[side] - minus[side]) / 2e-6;
                 assert!((numeric - views[side].jacobian.column(axis)).norm() < 1e-6, "axis {axis}, side {side}");

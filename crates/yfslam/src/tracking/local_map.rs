@@ -1,6 +1,6 @@
-//! The part of the map around the camera (ORB-SLAM, IEEE T-RO 2015, section V-D).
+//! The local map: the part of the map around the camera (ORB-SLAM, IEEE T-RO 2015, section V-D).
 //!
-//! In: the landmarks a frame sees. Out: the keyframes that see them too, their neighbours, and all landmarks of those.
+//! In: the matched landmarks of a frame. Out: the keyframes that observe them, the neighbours of these keyframes, and all their landmarks.
 
 use slotmap::SecondaryMap;
 
@@ -8,41 +8,42 @@ use crate::config::TrackingConfig;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::tracking::tracked_frame::TrackedFrame;
 
-/// Keyframes and landmarks around the camera. Buffers are reused.
+/// Keyframes and landmarks of the local map. Buffers are reused.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LocalMap {
-    /// Keyframes, those sharing most landmarks with the frame first.
+    /// Keyframes, in descending order of the number of landmarks shared with the frame.
     pub keyframes: Vec<KeyFrameId>,
-    /// Landmarks of those keyframes that the frame is not matched to.
+    /// Landmarks of these keyframes without a match in the frame.
     pub landmarks: Vec<LandmarkId>,
-    votes: SecondaryMap<KeyFrameId, u32>,
-    /// Mark of the last update in which a landmark was taken.
+    /// Number of landmarks that each keyframe shares with the frame.
+    shared: SecondaryMap<KeyFrameId, u32>,
+    /// Number of the last update in which a landmark was matched or added to `landmarks`.
     taken: SecondaryMap<LandmarkId, u64>,
     update: u64,
 }
 
 impl LocalMap {
-    /// Collects the surroundings of what `frame` sees. Returns the keyframe that shares most with it.
+    /// Collects the local map of `frame`. Returns the keyframe that shares most landmarks with it.
     pub(super) fn update(&mut self, config: &TrackingConfig, map: &Map, frame: &TrackedFrame) -> Option<KeyFrameId> {
         self.update += 1;
-        self.votes.clear();
+        self.shared.clear();
         for matched in frame.matches.iter().flatten() {
             let Some(id) = matched.landmark else { continue };
             let Some(landmark) = map.landmark(id) else { continue };
             self.taken.insert(id, self.update);
             for &(keyframe, _) in &landmark.observations {
-                match self.votes.get_mut(keyframe) {
-                    Some(votes) => *votes += 1,
+                match self.shared.get_mut(keyframe) {
+                    Some(count) => *count += 1,
                     None => {
-                        self.votes.insert(keyframe, 1);
+                        self.shared.insert(keyframe, 1);
                     }
                 }
             }
         }
         self.keyframes.clear();
-        self.keyframes.extend(self.votes.keys());
-        let votes = &self.votes;
-        self.keyframes.sort_unstable_by_key(|&k| (std::cmp::Reverse(votes[k]), k));
+        self.keyframes.extend(self.shared.keys());
+        let shared = &self.shared;
+        self.keyframes.sort_unstable_by_key(|&k| (std::cmp::Reverse(shared[k]), k));
         self.keyframes.truncate(config.local_keyframes);
         self.extend_by_neighbours(config, map);
         self.landmarks.clear();
@@ -57,7 +58,7 @@ impl LocalMap {
         self.keyframes.first().copied()
     }
 
-    /// Each keyframe brings its best covisible one, a child and its parent that are not there yet.
+    /// Adds, for each keyframe, its best covisible keyframe, a child and its parent, if they are not in the local map yet.
     fn extend_by_neighbours(&mut self, config: &TrackingConfig, map: &Map) {
         let direct = self.keyframes.len();
         for i in 0..direct {
@@ -65,15 +66,15 @@ impl LocalMap {
             if self.keyframes.len() >= config.local_keyframes {
                 return;
             }
-            let is_new = |id: &KeyFrameId, votes: &SecondaryMap<KeyFrameId, u32>| !votes.contains_key(*id);
+            let is_new = |id: &KeyFrameId, shared: &SecondaryMap<KeyFrameId, u32>| !shared.contains_key(*id);
             let covisible = keyframe.covisible.iter().take(config.local_neighbours).map(|(id, _)| *id);
-            let brought = [
-                covisible.clone().find(|id| is_new(id, &self.votes)),
-                keyframe.children.iter().copied().find(|id| is_new(id, &self.votes)),
-                keyframe.parent.filter(|id| is_new(id, &self.votes)),
+            let neighbours = [
+                covisible.clone().find(|id| is_new(id, &self.shared)),
+                keyframe.children.iter().copied().find(|id| is_new(id, &self.shared)),
+                keyframe.parent.filter(|id| is_new(id, &self.shared)),
             ];
-            for id in brought.into_iter().flatten() {
-                if self.votes.insert(id, 0).is_none() {
+            for id in neighbours.into_iter().flatten() {
+                if self.shared.insert(id, 0).is_none() {
                     self.keyframes.push(id);
                 }
             }

@@ -1,7 +1,7 @@
-//! The pose of each frame, from its trusted features and the map (ORB-SLAM2, IEEE T-RO 2017, section III).
+//! Tracking: the pose of each frame, from its static features and the map (ORB-SLAM2, IEEE T-RO 2017, section III).
 //!
-//! In: a frame's features with trust. Out: its pose and matches, and whether it should become a keyframe.
-//! The tracker only reads the map; what it saw of it is noted in [`ObservationCounts`].
+//! In: the features of a frame with their trust. Out: its pose and matches, and whether it becomes a keyframe.
+//! The tracker only reads the map. The landmarks that it expected and matched are collected in [`ObservationCounts`].
 
 pub(crate) mod keyframe_policy;
 mod local_map;
@@ -25,19 +25,19 @@ pub(crate) use tracked_frame::{Match, TrackedFrame};
 pub(crate) use two_view_initialiser::{StartFrame, TwoViewInitialiser, TwoViewMap};
 use visibility_check::is_free_space;
 
-/// Landmarks that frames should have seen, and those that they saw; one may stand there more than once.
+/// Landmarks that were expected in view, matched, or contradicted by the depth image in recent frames; an id may occur several times.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ObservationCounts {
-    /// In view.
+    /// Landmarks expected in view.
     pub visible: Vec<LandmarkId>,
-    /// FrameDetections, and fitting the pose.
+    /// Landmarks that were matched as inliers.
     pub found: Vec<LandmarkId>,
-    /// Not found, and what is behind them is seen.
+    /// Landmarks that were not matched, and at whose position the depth image shows free space.
     pub in_free_space: Vec<LandmarkId>,
 }
 
 impl ObservationCounts {
-    /// Forgets all.
+    /// Removes all.
     pub(crate) fn clear(&mut self) {
         self.visible.clear();
         self.found.clear();
@@ -45,45 +45,46 @@ impl ObservationCounts {
     }
 }
 
-/// Follows the camera from frame to frame.
+/// Tracker of the camera pose from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tracker {
     /// The frame being tracked.
     pub current: TrackedFrame,
     last: TrackedFrame,
-    /// Motion from the last frame to this one, `t_current_last`; `None` after a start or a loss.
+    /// Motion from the last frame to the current one, `t_current_last`; `None` after initialisation or when tracking was lost.
     velocity: Option<Pose>,
     local_map: LocalMap,
-    /// Landmarks in view of the current frame, and those found in it, in order.
+    /// Landmarks expected in view of the current frame, sorted.
     visible: Vec<LandmarkId>,
+    /// Landmarks matched in the current frame, sorted.
     found: Vec<LandmarkId>,
     rotation: RotationHistogram,
     reference: Option<KeyFrameId>,
     frames_since_keyframe: u64,
-    /// What was seen since the map's owner took note.
+    /// Landmarks of the frames since the owner of the map last counted them.
     pub observation_counts: ObservationCounts,
-    /// Landmarks that the current frame sees.
+    /// Number of landmarks matched as inliers in the current frame.
     pub inliers: usize,
 }
 
 impl Tracker {
-    /// Makes room for the next frame: the current one becomes the last.
+    /// Begins the next frame: the current one becomes the last.
     pub(crate) fn begin_frame(&mut self, timestamp_ns: i64) {
         std::mem::swap(&mut self.current, &mut self.last);
         self.current.begin(timestamp_ns);
         self.frames_since_keyframe += 1;
     }
 
-    /// The constant-velocity prediction of the pose of the current frame, `t_cam_world`.
+    /// Predicts the pose of the current frame, `t_cam_world`, by the constant-velocity model.
     pub(crate) fn predict(&self, map: &Map) -> Pose {
         self.velocity.unwrap_or_else(Pose::identity) * self.last.pose_in(map)
     }
 
-    /// Tracks a frame whose predecessor was tracked: a first pose, by which the filter compares the frame with the map, then the local
-    /// map, of which at least `min_inliers` landmarks must fit.
+    /// Tracks a frame whose predecessor was tracked: estimates a first pose, with which the dynamic filter compares the frame with the map,
+    /// then tracks the local map, of which at least `min_inliers` landmarks must be inliers.
     ///
     /// # Errors
-    /// The reason, if the pose is not known.
+    /// The reason why the pose is unknown.
     pub(crate) fn track(
         &mut self,
         context: &Context,
@@ -91,7 +92,7 @@ impl Tracker {
         filter: &mut dyn DynamicFilter,
         min_inliers: usize,
     ) -> Result<(), LostReason> {
-        if !self.estimate(context, map) {
+        if !self.estimate_first_pose(context, map) {
             return Err(LostReason::TooFewMatches);
         }
         let first = FirstPose { sensor: &context.sensor, map, t_cam_world: &self.current.t_cam_world };
@@ -102,18 +103,19 @@ impl Tracker {
         self.track_local_map(context, map, min_inliers)
     }
 
-    /// A first pose from the last frame, else from the reference keyframe. Returns whether one was found.
-    fn estimate(&mut self, context: &Context, map: &Map) -> bool {
+    /// Estimates the first pose from the last frame or, if that fails, from the reference keyframe. Returns whether it succeeded.
+    fn estimate_first_pose(&mut self, context: &Context, map: &Map) -> bool {
         let config = &context.config;
         let gap_s = (self.current.timestamp_ns - self.last.timestamp_ns) as f64 * 1e-9;
         if gap_s > config.tracking.max_gap_s {
             self.velocity = None;
         }
-        (self.velocity.is_some() && self.track_motion(context, map)) || self.track_reference(context, map)
+        (self.velocity.is_some() && self.track_motion_model(context, map))
+            || self.track_reference_keyframe(context, map)
     }
 
-    /// Constant-velocity model: the points of the last frame are sought around their projection.
-    fn track_motion(&mut self, context: &Context, map: &Map) -> bool {
+    /// Tracks with the constant-velocity model: searches the points of the last frame around their projections.
+    fn track_motion_model(&mut self, context: &Context, map: &Map) -> bool {
         let Context { sensor, config } = context;
         let c = &config.tracking;
         let prediction = self.predict(map);
@@ -132,8 +134,8 @@ impl Tracker {
         false
     }
 
-    /// Descriptors alone: the landmarks of the reference keyframe are sought everywhere in the frame.
-    fn track_reference(&mut self, context: &Context, map: &Map) -> bool {
+    /// Tracks the reference keyframe: searches its landmarks in the whole frame by descriptor.
+    fn track_reference_keyframe(&mut self, context: &Context, map: &Map) -> bool {
         let c = &context.config.tracking;
         self.last.follow_map(map);
         let Some(keyframe) = self.reference.and_then(|id| map.keyframe(id)) else { return false };
@@ -143,10 +145,10 @@ impl Tracker {
             && self.current.refine_pose(context) >= c.motion_min_inliers
     }
 
-    /// Matches the local map and refines the pose with all of it.
+    /// Matches the landmarks of the local map and refines the pose with all matches.
     ///
     /// # Errors
-    /// If fewer than `min_inliers` landmarks fit.
+    /// If fewer than `min_inliers` landmarks are inliers.
     pub(crate) fn track_local_map(
         &mut self,
         context: &Context,
@@ -155,8 +157,8 @@ impl Tracker {
     ) -> Result<(), LostReason> {
         let c = &context.config.tracking;
         for matched in &mut self.current.matches {
-            // Borrowed points have done their work: the refined pose rests on the map alone.
-            if matched.is_some_and(|s| s.landmark.is_none()) {
+            // Visual odometry points help the first pose only; the refined pose depends on the map alone.
+            if matched.is_some_and(|m| m.landmark.is_none()) {
                 *matched = None;
             }
         }
@@ -171,7 +173,7 @@ impl Tracker {
         self.visible.dedup();
         self.inliers = self.current.refine_pose(context);
         if self.inliers < min_inliers {
-            // The pose is not known, hence neither is what should have been in view.
+            // Without a pose it is unknown which landmarks were in view, so they are not counted.
             return Err(LostReason::TooFewInliers { found: self.inliers, needed: min_inliers });
         }
         self.observation_counts.visible.extend_from_slice(&self.visible);
@@ -181,10 +183,10 @@ impl Tracker {
         Ok(())
     }
 
-    /// Notes landmarks that the frame, once tracked, sees through.
+    /// Checks the visibility of landmarks that the tracked frame did not match: collects those in the measured free space.
     pub(crate) fn check_visibility(&mut self, context: &Context, map: &Map, depth: &DepthImage) {
         let (sensor, config) = (&context.sensor, &context.config.dynamic.full);
-        // As much as there can be: later frames shall not have to ask for memory.
+        // The largest possible size is reserved, so that later frames do not allocate memory.
         self.found.clear();
         self.found.reserve(self.visible.capacity());
         self.observation_counts.in_free_space.reserve(self.visible.capacity());
@@ -198,20 +200,20 @@ impl Tracker {
         }
     }
 
-    /// Ends a tracked frame: relative_poses it to its reference and learns the motion.
+    /// Ends a tracked frame: updates the constant-velocity model and the pose relative to the reference keyframe.
     pub(crate) fn accept(&mut self, map: &Map) {
         self.velocity = self.last.reference.map(|_| self.current.t_cam_world * self.last.t_cam_world.inverse());
         if let Some(reference) = self.reference {
-            self.current.attach_to(reference, map);
+            self.current.set_reference(reference, map);
         }
     }
 
-    /// Forgets the motion: the last frame's pose is not one to measure it from.
+    /// Resets the constant-velocity model, because the pose of the last frame is not suited to measure the motion.
     pub(crate) fn reset_velocity(&mut self) {
         self.velocity = None;
     }
 
-    /// Ends a frame that could not be tracked: its pose stays that of the last one.
+    /// Ends a frame that could not be tracked: it keeps the pose of the last one.
     pub(crate) fn reject(&mut self) {
         self.velocity = None;
         self.current.clear_matches();
@@ -220,7 +222,7 @@ impl Tracker {
         self.inliers = 0;
     }
 
-    /// Whether the current frame should become a keyframe.
+    /// Returns whether the current frame should become a keyframe.
     pub(crate) fn wants_keyframe(&self, context: &Context, map: &Map) -> bool {
         let Some(reference) = self.reference else { return true };
         let frames_since = self.frames_since_keyframe;
@@ -228,17 +230,17 @@ impl Tracker {
         is_keyframe_wanted(context, map, reference, &self.current, summary)
     }
 
-    /// Notes that the current frame was handed over to become a keyframe.
+    /// Records that the insertion of the current frame as a keyframe was requested.
     pub(crate) fn keyframe_requested(&mut self) {
         self.frames_since_keyframe = 0;
     }
 
-    /// Notes that an earlier frame became a keyframe.
+    /// Records that an earlier frame became a keyframe, which becomes the reference keyframe.
     pub(crate) fn adopt_reference(&mut self, keyframe: KeyFrameId) {
         self.reference = Some(keyframe);
     }
 
-    /// Notes that the current frame became a keyframe, and takes the pose and matches that mapping gave it.
+    /// Records that the current frame became a keyframe, and copies its pose and matches after mapping.
     pub(crate) fn keyframe_inserted(&mut self, keyframe: KeyFrameId, map: &Map) {
         self.reference = Some(keyframe);
         let Some(k) = map.keyframe(keyframe) else { return };
@@ -249,12 +251,12 @@ impl Tracker {
         }
     }
 
-    /// The keyframe that the last tracked frame shares most with.
+    /// Returns the reference keyframe: the one that shares most landmarks with the last tracked frame.
     pub(crate) fn reference(&self) -> Option<KeyFrameId> {
         self.reference
     }
 
-    /// Forgets everything but its buffers, as after a start.
+    /// Resets everything except the buffers.
     pub(crate) fn reset(&mut self) {
         self.velocity = None;
         self.reference = None;

@@ -1,6 +1,6 @@
-//! Whether the pose is known, and why not.
+//! The tracking state, and the reasons why a pose is unknown.
 
-/// Whether the pose of the camera is known.
+/// State of tracking.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TrackingState {
     /// There is no map yet.
@@ -8,48 +8,48 @@ pub enum TrackingState {
     NotInitialized,
     /// The pose is known.
     Tracking,
-    /// The pose is not known; the map stays.
+    /// The pose is unknown; the map is kept for relocalisation.
     Lost,
 }
 
-/// Why the pose of a frame is not known.
+/// Reason why the pose of a frame is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LostReason {
-    /// The image has too few features to begin a map.
-    #[error("{found} features, {needed} are needed to begin a map")]
+    /// The image has too few features for initialisation.
+    #[error("the image has {found} features, but initialisation needs {needed}")]
     TooFewFeatures {
-        /// Features found.
+        /// Number of features.
         found: usize,
-        /// Features needed (`tracking.init_min_features`).
+        /// Least number of features (`tracking.init_min_features`).
         needed: usize,
     },
-    /// Too few static features have a depth to begin a map.
-    #[error("{found} static features with depth, {needed} are needed to begin a map")]
+    /// Too few static features have a depth for initialisation.
+    #[error("{found} static features have a depth, but initialisation needs {needed}")]
     TooFewDepths {
-        /// Static features with depth.
+        /// Number of static features with depth.
         found: usize,
-        /// Features needed (`tracking.init_min_landmarks`).
+        /// Least number of features (`tracking.init_min_landmarks`).
         needed: usize,
     },
-    /// A camera without depth has not moved far enough sideways to begin a map.
-    #[error("no second view with enough parallax yet")]
+    /// A camera without depth has not moved far enough for initialisation.
+    #[error("no two frames with enough parallax for initialisation yet")]
     NoSecondView,
-    /// The mapping thread has not finished the last keyframe.
+    /// The mapping thread has not finished the last keyframe yet.
     #[error("the mapping thread is busy")]
     MappingBusy,
-    /// Neither the last frame nor the reference keyframe gives enough matches for a first pose.
+    /// Neither the last frame nor the reference keyframe has enough matches for a first pose.
     #[error("too few matches with the last frame and the reference keyframe")]
     TooFewMatches,
-    /// Too few landmarks of the local map fit.
-    #[error("{found} landmarks fit, {needed} are needed")]
+    /// Too few landmarks of the local map are inliers.
+    #[error("{found} landmarks are inliers, but tracking needs {needed}")]
     TooFewInliers {
-        /// Landmarks that fit.
+        /// Number of inliers.
         found: usize,
-        /// Landmarks needed.
+        /// Least number of inliers.
         needed: usize,
     },
-    /// The camera was lost, and no place of the map was recognised.
-    #[error("no place of the map was recognised")]
+    /// Tracking was lost, and relocalisation has not recognised a place of the map.
+    #[error("relocalisation recognised no place of the map")]
     NotRecognised,
 }

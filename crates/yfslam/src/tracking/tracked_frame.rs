@@ -1,4 +1,6 @@
-//! The frame being tracked: its features and what they are matched to.
+//! A frame during tracking: its features, matches and pose.
+//!
+//! In: features and matches. Out: the refined pose and its covariance (motion-only bundle adjustment).
 
 use nalgebra::{Matrix6, Point3};
 
@@ -8,19 +10,19 @@ use crate::geometry::Pose;
 use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
 use crate::optimize::pose_only::{PoseObservation, optimize_pose, pose_covariance};
 
-/// A point that a feature is matched to.
+/// The point to which a feature is matched: a landmark or a visual odometry point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Match {
-    /// The landmark; `None` for a point borrowed from the last frame's depth.
+    /// Landmark; `None` for a visual odometry point.
     pub landmark: Option<LandmarkId>,
-    /// Where it is in the world, m.
+    /// Position in the world, m.
     pub point_world: Point3<f64>,
-    /// Probability that it still is there ([`Landmark::trust`]).
+    /// Probability that the point still exists ([`Landmark::trust`]).
     pub trust: f32,
 }
 
 impl Match {
-    /// Of a landmark.
+    /// Makes a match with a landmark.
     pub(crate) fn of(id: LandmarkId, landmark: &Landmark) -> Self {
         Self { landmark: Some(id), point_world: landmark.position, trust: landmark.trust() }
     }
@@ -31,44 +33,46 @@ impl Match {
 pub(crate) struct TrackedFrame {
     /// Time of the frame, ns.
     pub timestamp_ns: i64,
-    /// What was seen.
+    /// Features.
     pub features: FrameFeatures,
-    /// What each feature is matched to.
+    /// Match of each feature.
     pub matches: Vec<Option<Match>>,
-    /// Maps world points into this camera.
+    /// Pose: transforms points from the world into the camera.
     pub t_cam_world: Pose,
-    /// The keyframe it is tied to, and its pose seen from there, `t_cam_reference` ([`Map::relative_pose`]).
+    /// Reference keyframe, and the pose relative to it, `t_cam_reference` ([`Map::relative_pose`]).
     pub reference: Option<(KeyFrameId, Pose)>,
     observations: Vec<PoseObservation>,
+    /// Feature of each observation.
     observed: Vec<u32>,
+    /// Depth and index of unmatched features.
     nearest: Vec<(f32, u32)>,
 }
 
 impl TrackedFrame {
-    /// Begins another frame; its features and matches are set afterwards.
+    /// Begins another frame; the caller sets its features and matches afterwards.
     pub(crate) fn begin(&mut self, timestamp_ns: i64) {
         self.timestamp_ns = timestamp_ns;
         self.observations.clear();
     }
 
-    /// Returns the covariance of the pose (see [`pose_covariance`]) that the inliers of its last refinement give.
+    /// Returns the covariance of the pose (see [`pose_covariance`]) from the inliers of its last refinement.
     pub(crate) fn covariance(&self, sensor: &SensorModel) -> Option<Matrix6<f64>> {
         pose_covariance(&sensor.pinhole, &self.t_cam_world, &self.observations)
     }
 
-    /// Forgets all matches.
+    /// Removes all matches.
     pub(crate) fn clear_matches(&mut self) {
         self.matches.clear();
         self.matches.resize(self.features.len(), None);
     }
 
-    /// Features that may be matched: trusted and not matched yet.
+    /// Returns whether a feature may be matched: it has no match and its trust is above 0.
     #[inline]
-    pub(crate) fn is_open(&self, feature: usize) -> bool {
+    pub(crate) fn is_matchable(&self, feature: usize) -> bool {
         self.matches[feature].is_none() && self.features.features[feature].trust > 0.0
     }
 
-    /// Forgets the matches of features that are not trusted any more.
+    /// Removes the matches of features with trust 0.
     pub(crate) fn drop_distrusted(&mut self) {
         for (matched, feature) in self.matches.iter_mut().zip(&self.features.features) {
             if feature.trust <= 0.0 {
@@ -77,7 +81,7 @@ impl TrackedFrame {
         }
     }
 
-    /// Distrusts the features that boxes speak against and that are no landmarks either.
+    /// Sets the trust of features to 0 if the dynamic filter reduced it and no landmark confirms them.
     pub(crate) fn settle_doubts(&mut self) {
         for (matched, feature) in self.matches.iter().zip(&mut self.features.features) {
             if feature.trust < 1.0 && matched.is_none() {
@@ -86,13 +90,12 @@ impl TrackedFrame {
         }
     }
 
-    /// Number of matched features.
-    pub(crate) fn matched(&self) -> usize {
+    /// Returns the number of matches.
+    pub(crate) fn match_count(&self) -> usize {
         self.matches.iter().flatten().count()
     }
 
-    /// Refines the pose from all matches and drops those that do not fit. Returns the number of inliers that are landmarks of the
-    /// map with more than a single matched's worth of evidence.
+    /// Refines the pose from all matches and removes the outliers. Returns the number of inliers that are landmarks.
     pub(crate) fn refine_pose(&mut self, context: &Context) -> usize {
         let (sensor, config) = (&context.sensor, &context.config.pose);
         self.observations.clear();
@@ -109,25 +112,25 @@ impl TrackedFrame {
             });
         }
         optimize_pose(&sensor.pinhole, config, &mut self.t_cam_world, &mut self.observations);
-        let mut on_map = 0;
+        let mut landmarks = 0;
         for (&i, o) in self.observed.iter().zip(&self.observations) {
             let matched = &mut self.matches[i as usize];
             if !o.inlier {
                 *matched = None;
-            } else if matched.is_some_and(|s| s.landmark.is_some()) {
-                on_map += 1;
+            } else if matched.is_some_and(|m| m.landmark.is_some()) {
+                landmarks += 1;
             }
         }
-        on_map
+        landmarks
     }
 
-    /// Lends unmatched features with depth to the next frame as points: all close ones, at least the `at_least` closest. They never
-    /// enter the map.
+    /// Adds unmatched features with depth as visual odometry points for the next frame: all within the close limit, and at least the
+    /// `at_least` nearest. They never become landmarks.
     pub(crate) fn add_odometry_points(&mut self, sensor: &SensorModel, at_least: usize) {
         let t_world_cam = self.t_cam_world.inverse();
         self.nearest.clear();
         for (i, f) in self.features.features.iter().enumerate() {
-            if let (Some(z), true) = (f.depth_m, self.is_open(i)) {
+            if let (Some(z), true) = (f.depth_m, self.is_matchable(i)) {
                 self.nearest.push((z, i as u32));
             }
         }
@@ -142,14 +145,14 @@ impl TrackedFrame {
         }
     }
 
-    /// Its pose, `t_cam_world`, where the map is now.
+    /// Returns the pose `t_cam_world` after all corrections of the map so far.
     pub(crate) fn pose_in(&self, map: &Map) -> Pose {
-        let tied =
+        let corrected =
             self.reference.and_then(|(reference, t_cam_reference)| map.absolute_pose(reference, &t_cam_reference));
-        tied.unwrap_or(self.t_cam_world)
+        corrected.unwrap_or(self.t_cam_world)
     }
 
-    /// Brings pose and matched points up to date after the map moved; matches to landmarks that are gone are dropped.
+    /// Updates pose and matched points after corrections of the map; matches with removed landmarks are removed.
     pub(crate) fn follow_map(&mut self, map: &Map) {
         self.t_cam_world = self.pose_in(map);
         for matched in &mut self.matches {
@@ -159,8 +162,8 @@ impl TrackedFrame {
         }
     }
 
-    /// Ties the frame to a keyframe, so that it moves along when the map is corrected.
-    pub(crate) fn attach_to(&mut self, reference: KeyFrameId, map: &Map) {
+    /// Sets the reference keyframe, so that the frame follows corrections of the map.
+    pub(crate) fn set_reference(&mut self, reference: KeyFrameId, map: &Map) {
         self.reference =
             map.relative_pose(reference, &self.t_cam_world).map(|t_cam_reference| (reference, t_cam_reference));
     }

@@ -1,7 +1,7 @@
-//! The beginning of a map without depth: two frames between which the camera has moved enough (ORB-SLAM, IEEE T-RO 2015, section IV).
+//! Initialisation without depth: a map from two frames between which the camera has moved enough (ORB-SLAM, IEEE T-RO 2015, section IV).
 //!
-//! In: frames, one after another, with the trust of their features. Out: a [`TwoViewMap`], when two of them tell both motion and points.
-//! Its unit of length is the median depth of the points in the first frame: a single camera knows no other.
+//! In: consecutive frames with the trust of their features. Out: a [`TwoViewMap`] as soon as two frames determine motion and points. Its unit
+//! of length is the median depth of the points in the first frame, because a single camera does not measure the scale.
 
 use std::sync::Arc;
 
@@ -16,45 +16,45 @@ use crate::optimize::schur::{BundleProblem, Observation};
 use crate::tracking::TrackedFrame;
 use crate::tracking::search::search_first_frame;
 
-/// A frame that is to become a keyframe, and its picture.
+/// A frame of the initialisation, and its image.
 #[derive(Clone, Debug)]
 pub(crate) struct StartFrame {
-    /// The frame; its pose is set.
+    /// Frame with its pose.
     pub frame: TrackedFrame,
-    /// Its picture.
+    /// Colour image.
     pub color: Arc<RgbImage>,
 }
 
-/// A landmark: its feature in the first frame, that in the second, and its place in the world.
+/// A landmark: its feature in the first frame, its feature in the second frame, and its position in the world.
 pub(super) type StartPoint = (usize, usize, Point3<f64>);
 
-/// Two frames that make a map.
+/// An initial map of two frames.
 #[derive(Clone, Debug)]
 pub(crate) struct TwoViewMap {
-    /// The first, whose camera is the world.
+    /// First frame, whose camera frame is the world frame.
     pub first: StartFrame,
-    /// The second.
+    /// Second frame.
     pub second: StartFrame,
     /// Landmarks.
     pub points: Vec<StartPoint>,
 }
 
-/// Waits for two frames that make a map.
+/// Search for two frames from which a map can be initialised.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TwoViewInitialiser {
     first: Option<StartFrame>,
-    /// Where each feature of the first frame was seen last, undistorted px.
-    last_seen: Vec<[f32; 2]>,
+    /// Last known position of each feature of the first frame, undistorted px.
+    last_positions: Vec<[f32; 2]>,
     rotation: RotationHistogram,
 }
 
 impl TwoViewInitialiser {
-    /// Forgets the first frame.
+    /// Removes the first frame.
     pub(crate) fn reset(&mut self) {
         self.first = None;
     }
 
-    /// Looks whether `current` and the first frame make a map. A frame that shows too little of what the first showed becomes the first.
+    /// Tries to initialise a map from the first frame and `current`. If they have too few matches, `current` becomes the first frame.
     pub(crate) fn add(
         &mut self,
         context: &Context,
@@ -67,7 +67,7 @@ impl TwoViewInitialiser {
             self.begin(config, current, color);
             return None;
         };
-        let matches = search_first_frame(config, &first.frame, current, &mut self.last_seen, &mut self.rotation);
+        let matches = search_first_frame(config, &first.frame, current, &mut self.last_positions, &mut self.rotation);
         if matches.len() < c.start_min_matches {
             self.begin(config, current, color);
             return None;
@@ -80,8 +80,8 @@ impl TwoViewInitialiser {
         let found = reconstruct(&sensor.pinhole, c, config.depth.corner_sigma_px, &pairs);
         let adjusted = match &found {
             Ok(found) => adjust(context, first, current, &matches, found),
-            Err(refused) => {
-                tracing::debug!(matches = matches.len(), %refused, "two frames make no map yet");
+            Err(error) => {
+                tracing::debug!(matches = matches.len(), %error, "two frames do not determine a map yet");
                 None
             }
         };
@@ -93,18 +93,18 @@ impl TwoViewInitialiser {
         Some(TwoViewMap { first, second, points })
     }
 
-    /// Takes a frame as the first if it has as many features as matches are needed.
+    /// Makes `current` the first frame if it has more static features than the number of matches needed.
     fn begin(&mut self, config: &Config, current: &TrackedFrame, color: &Arc<RgbImage>) {
-        let trusted = current.features.features.iter().filter(|f| f.trust > 0.0 && f.octave == 0).count();
-        self.first = (trusted > config.monocular.start_min_matches)
+        let static_features = current.features.features.iter().filter(|f| f.trust > 0.0 && f.octave == 0).count();
+        self.first = (static_features > config.monocular.start_min_matches)
             .then(|| StartFrame { frame: current.clone(), color: Arc::clone(color) });
-        self.last_seen.clear();
-        self.last_seen.extend(current.features.features.iter().map(|f| [f.u, f.v]));
+        self.last_positions.clear();
+        self.last_positions.extend(current.features.features.iter().map(|f| [f.u, f.v]));
     }
 }
 
-/// Bundle adjustment of the two frames; then lengths are scaled. `None` if too few points are left, or the direction of the motion is not
-/// certain.
+/// Refines the two frames by bundle adjustment, then scales all lengths to a median depth of 1. `None` if too few points remain or the
+/// direction of the baseline is too uncertain.
 fn adjust(
     context: &Context,
     first: &StartFrame,
@@ -141,7 +141,7 @@ fn adjust(
         is_inlier && point.coords.angle(&(point - second_center)) >= min_parallax
     };
     let kept: Vec<usize> = (0..features.len()).filter(|&number| fits(number)).collect();
-    tracing::debug!(model = ?found.model, points = kept.len(), sigma_deg, "two frames tell motion and points");
+    tracing::debug!(model = ?found.model, points = kept.len(), sigma_deg, "two frames determine motion and points");
     if kept.len() < config.tracking.init_min_landmarks || sigma_deg > config.monocular.start_max_sigma_deg {
         return None;
     }
@@ -168,7 +168,7 @@ mod tests {
         Context { sensor: crate::map::scene::Scene::new().sensor, config: Config::default() }
     }
 
-    /// What a camera at `t_cam_world` sees of points of a room, from the point `from` on.
+    /// Returns the frame of a camera at `t_cam_world` that observes 300 points, beginning with number `from`.
     fn frame(sensor: &SensorModel, t_cam_world: &Pose, from: usize) -> TrackedFrame {
         let (mut features, mut descriptors) = (Vec::new(), Vec::new());
         for number in from..from + 300 {
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn two_views_make_a_map_whose_median_depth_is_one() {
+    fn two_views_initialise_a_map_with_median_depth_one() {
         let context = context();
         let motion = Pose::new(Vector3::new(-0.25, 0.02, 0.05), Vector3::new(0.01, 0.03, 0.0));
         let mut starts = initialise(&context, &[(Pose::identity(), 0), (motion, 0)]);
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_shows_something_else_becomes_the_first() {
+    fn a_frame_with_other_points_becomes_the_first() {
         let context = context();
         let moved = |x: f64| Pose::translation(x, 0.0, 0.0);
         let starts = initialise(&context, &[(moved(0.0), 0), (moved(0.0), 1000), (moved(-0.25), 1000)]);
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_too_short_to_be_certain_makes_no_map() {
+    fn a_short_and_uncertain_motion_initialises_no_map() {
         let context = context();
         let starts = initialise(&context, &[(Pose::identity(), 0), (Pose::translation(-0.02, 0.0, 0.0), 0)]);
         assert!(starts.iter().all(Option::is_none));

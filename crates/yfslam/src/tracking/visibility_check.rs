@@ -1,7 +1,7 @@
-//! Landmarks that are no longer where they were: the depth image shows what is behind them.
+//! Visibility check: landmarks that no longer exist, because the depth image measures free space at their position.
 //!
-//! In: the frame's pose and depth, landmarks that should be in view. Out: those that it looks through. What stands there no more is
-//! forgotten as OctoMap (Hornung et al., Autonomous Robots 2013) forgets a voxel: see [`crate::map::Landmark::standing`].
+//! In: pose and depth image of a frame, and the position of a landmark. Out: whether it lies in free space. The existence log-odds of such
+//! landmarks decrease as those of a voxel in OctoMap (Hornung et al., Autonomous Robots 2013): [`crate::map::Landmark::existence_log_odds`].
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,10 +10,10 @@ use crate::context::SensorModel;
 use crate::geometry::Pose;
 use crate::image::DepthImage;
 
-/// Distance at which depth around the landmark is read too, px: corners often are at an edge.
+/// Distance of the four further pixels at which depth is read, px: corners often lie on the edge of an object.
 const AROUND_PX: f64 = 8.0;
 
-/// Whether a frame sees through a point of the world, all around.
+/// Returns whether a frame measures free space at a point of the world: the depth behind it at the pixel and at all pixels around it.
 pub(super) fn is_free_space(
     config: &FullConfig,
     sensor: &SensorModel,
@@ -22,15 +22,15 @@ pub(super) fn is_free_space(
     point_world: &Point3<f64>,
 ) -> bool {
     let p: Vector3<f64> = (t_cam_world * point_world).coords;
-    let clear_m = (1.0 + f64::from(config.through_share)) * p.z + f64::from(config.through_m);
+    let min_depth_m = (1.0 + f64::from(config.through_share)) * p.z + f64::from(config.through_m);
     let (x, y) = (p.x / p.z, p.y / p.z);
     let [u, v] = sensor.camera.distort(x, y);
-    let around = [[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
+    let offsets = [[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];
     p.z > 0.0
-        && around.iter().all(|[dx, dy]| {
+        && offsets.iter().all(|[dx, dy]| {
             let at = [u + AROUND_PX * dx, v + AROUND_PX * dy].map(|v| v.round());
             at.iter().all(|v| *v >= 0.0)
-                && depth.metres(at[0] as usize, at[1] as usize).is_some_and(|z| f64::from(z) > clear_m)
+                && depth.metres(at[0] as usize, at[1] as usize).is_some_and(|z| f64::from(z) > min_depth_m)
         })
 }
 
@@ -42,23 +42,23 @@ mod tests {
     use crate::image::Image;
 
     #[test]
-    fn a_point_is_seen_through_if_all_around_it_the_background_shows() {
+    fn a_point_is_in_free_space_if_all_pixels_around_it_show_the_background() {
         let (fx, fy, cx, cy, distortion) = (520.0, 520.0, 320.0, 240.0, [0.0; 5]);
         let camera = Camera::pinhole(640, 480, fx, fy, cx, cy).with_distortion(distortion);
         let config = Config::default();
         let sensor = SensorModel::new(&camera, &config, &[1.0]);
-        // A point 2 m away, seen in the middle of the picture.
-        let through = |depth_of: &dyn Fn(usize) -> u16| {
+        // A point at a depth of 2 m in the centre of the image.
+        let is_free = |depth_of: &dyn Fn(usize) -> u16| {
             let mut raw = Image::new(640, 480);
             (0..480).for_each(|y| (0..640).for_each(|x| raw.row_mut(y)[x] = depth_of(x)));
             let depth = DepthImage { raw, metres_per_unit: 1.0 / 5000.0 };
             let pose = Pose::translation(0.0, 0.0, 1.0);
             is_free_space(&config.dynamic.full, &sensor, &depth, &pose, &Point3::new(0.0, 0.0, 1.0))
         };
-        assert!(through(&|_| 15_000), "a wall at 3 m");
-        assert!(!through(&|_| 10_500), "what is there, with noise");
-        assert!(!through(&|_| 5_000), "somebody in front");
-        assert!(!through(&|_| 0), "no depth");
-        assert!(!through(&|x| if x < 318 { 10_000 } else { 15_000 }), "the edge of what is there");
+        assert!(is_free(&|_| 15_000), "a wall at 3 m");
+        assert!(!is_free(&|_| 10_500), "the object itself, with noise");
+        assert!(!is_free(&|_| 5_000), "a person in front of it");
+        assert!(!is_free(&|_| 0), "no depth");
+        assert!(!is_free(&|x| if x < 318 { 10_000 } else { 15_000 }), "the edge of the object");
     }
 }
