@@ -13,6 +13,7 @@
 //! disappears when later patches show free space there.
 
 mod background;
+mod block_state;
 mod classes;
 mod cloud;
 mod gravity;

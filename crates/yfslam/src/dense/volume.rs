@@ -3,20 +3,18 @@
 //! In: patches and their poses, also after each correction of the map. Out: for each voxel whether it is occupied, free or unknown.
 //! Each block keeps the observations of each patch and adds them up in temporal order, clamped at every step (OctoMap, section 4).
 //! A patch whose pose changes is removed and integrated again, only the blocks concerned are added up again, and the result has the
-//! same bits as a volume made anew. The clamps give late observations more weight: an object that has left becomes free after a few
+//! same bits as a volume built from scratch. The clamps give late observations more weight: an object that has left becomes free after a few
 //! of them.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Translation3};
 
+use crate::dense::block_state::{BlockState, PER_UNIT, Steps};
 use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
 use crate::dense::trace::{BlockObservation, trace};
 use crate::dense::voxels::{Bits, Block, SIDE, VOXELS, Voxel, block_of, index_in_block, voxel_in};
 use crate::dense::{DenseConfig, DenseMap};
-
-/// Log-odds are stored in thousandths.
-const PER_UNIT: f32 = 1000.0;
 
 /// Occupied, free and unknown space, in voxels.
 #[derive(Clone, Debug)]
@@ -35,26 +33,6 @@ struct IntegratedPatch {
     blocks: Vec<Block>,
 }
 
-/// The probabilities of the configuration as log-odds, in thousandths.
-#[derive(Clone, Copy, Debug)]
-struct Steps {
-    hit: i16,
-    miss: i16,
-    min: i16,
-    max: i16,
-    occupied: i16,
-}
-
-/// The observations of a block by patches, in the order of their numbers, and their sum.
-#[derive(Clone, Debug, Default)]
-struct BlockState {
-    observations: Vec<(u32, Bits, Bits)>,
-    /// Number of observations that have been added up.
-    summed: usize,
-    known: Bits,
-    log_odds: Vec<i16>,
-}
-
 /// A voxel that is known to be occupied or free.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownVoxel {
@@ -69,15 +47,7 @@ pub struct KnownVoxel {
 impl Volume {
     /// Returns an empty volume.
     pub(crate) fn new(config: &DenseConfig) -> Self {
-        let log_odds = |p: f32| ((p / (1.0 - p)).ln() * PER_UNIT).round() as i16;
-        let steps = Steps {
-            hit: log_odds(config.hit),
-            miss: log_odds(config.miss),
-            min: log_odds(config.clamp_min),
-            max: log_odds(config.clamp_max),
-            occupied: log_odds(config.occupied),
-        };
-        Self { config: config.clone(), steps, blocks: BTreeMap::new(), patches: Vec::new() }
+        Self { config: config.clone(), steps: Steps::new(config), blocks: BTreeMap::new(), patches: Vec::new() }
     }
 
     /// Returns the configuration with which it was made.
@@ -238,27 +208,6 @@ impl Volume {
     }
 }
 
-impl BlockState {
-    fn sum_up(&mut self, steps: &Steps) {
-        if self.summed == self.observations.len() {
-            return;
-        }
-        if self.summed == 0 {
-            self.known = Bits::default();
-            self.log_odds.clear();
-            self.log_odds.resize(VOXELS, 0);
-        }
-        let (known, log_odds) = (&mut self.known, &mut self.log_odds);
-        for (_, hit, free) in &self.observations[self.summed..] {
-            known.insert_all(hit);
-            known.insert_all(free);
-            hit.for_each(|index| log_odds[index] = (log_odds[index] + steps.hit).min(steps.max));
-            free.for_each(|index| log_odds[index] = (log_odds[index] + steps.miss).max(steps.min));
-        }
-        self.summed = self.observations.len();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::{Point3, Vector3};
@@ -324,12 +273,12 @@ mod tests {
             assert!(moved.integrate(number, &fixture.grid, &patch, Some(pose).filter(|_| number < 5)));
         }
         moved.update();
-        let mut anew = Volume::new(&fixture.config);
+        let mut rebuilt = Volume::new(&fixture.config);
         corrected.iter().take(5).enumerate().for_each(|(number, pose)| {
-            anew.integrate(number, &fixture.grid, &patch, Some(pose));
+            rebuilt.integrate(number, &fixture.grid, &patch, Some(pose));
         });
-        anew.update();
-        assert!(moved.voxels().eq(anew.voxels()) && anew.voxels().count() > 1000);
+        rebuilt.update();
+        assert!(moved.voxels().eq(rebuilt.voxels()) && rebuilt.voxels().count() > 1000);
     }
 
     #[test]

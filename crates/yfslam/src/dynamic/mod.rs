@@ -29,7 +29,8 @@ pub use region::{MovingMask, Region};
 pub struct FilterInput<'a> {
     /// Detections of movable objects, of any score; boxes in px of the raw image.
     pub movable: &'a [Detection],
-    /// Whether a detector processed this image. If not, `movable` is empty and says nothing about the scene.
+    /// Whether a detector processed this image. If not, `movable` is empty, which does not mean that the image shows no movable
+    /// object.
     pub detected: bool,
     /// Segmentation of the movable objects, if the detector or the caller gives one: 0 where there is none, any other value where
     /// there is one.
