@@ -1,8 +1,8 @@
 //! The dense map while the system runs: keyframe patches with poses relative to keyframes, and the volume that follows them.
 //!
-//! In: patches with the keyframe that each belongs to, and the map whenever it was corrected. Out: a volume that is consistent with the
-//! trajectory at any time. With [`Execution::Inline`] a patch is entered at once; with [`Execution::Threaded`] on a thread of its own,
-//! which tracking never waits for: a patch that comes while two are waiting is left out.
+//! In: patches with the keyframe that each belongs to, and the map whenever it was corrected. Out: a volume that is consistent with
+//! the trajectory at any time. With [`Execution::Inline`] a patch is integrated at once; with [`Execution::Threaded`] on a thread
+//! of its own, for which tracking never waits: a patch is left out if two others are still in the queue.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,8 +22,8 @@ use crate::image::{DepthImage, RgbImage};
 use crate::map::{KeyFrameId, KeyframeRelativePose, Map};
 use crate::worker::{Execution, Worker};
 
-/// Patches that may wait for the thread.
-const WAITING: usize = 2;
+/// Length of the thread's queue.
+const QUEUE_LENGTH: usize = 2;
 
 /// The patches of keyframes, and the volume that follows their poses in the map.
 pub(crate) struct DenseMapper {
@@ -98,9 +98,9 @@ impl DenseMapper {
             Fusion { grid: grid.clone(), up: gravity::of_camera(), patches: Vec::new(), volume: Volume::new(config) };
         let fusion = match execution {
             Execution::Inline => FusionOwner::Inline(Box::new(fusion)),
-            Execution::Threaded => {
-                FusionOwner::Threaded(Worker::spawn("dense map", WAITING, |_| move |request| fusion.handle(request))?)
-            }
+            Execution::Threaded => FusionOwner::Threaded(Worker::spawn("dense map", QUEUE_LENGTH, |_| {
+                move |request| fusion.handle(request)
+            })?),
         };
         Ok(Self {
             config: config.clone(),
@@ -144,7 +144,8 @@ impl DenseMapper {
         Ok(self)
     }
 
-    /// Returns whether the camera has moved, turned or waited long enough since the last patch for another one.
+    /// Returns whether a keyframe becomes a patch: the camera has moved or turned far enough since the last one, or enough time has
+    /// passed.
     pub(crate) fn is_due(&self, timestamp_ns: i64, t_world_cam: &Pose) -> bool {
         let Some((last_ns, last)) = &self.last else { return true };
         let moved = last.inverse() * t_world_cam;

@@ -38,7 +38,6 @@ pub(super) fn close(
     localised: &TrackedFrame,
     s_cam_candidate: &Similarity,
 ) {
-    let Context { sensor: _, config: _ } = context;
     let Some(k) = map.keyframe(keyframe) else { return };
     let s_far_near = s_cam_candidate.inverse() * k.t_cam_world;
     let is_one_submap = map.root(keyframe) == map.root(candidate.keyframe);
@@ -91,7 +90,6 @@ impl LoopCorrection {
         candidate: &Candidate,
         localised: &TrackedFrame,
     ) {
-        let Context { sensor: _, config: _ } = context;
         for (feature, matched) in localised.matches.iter().enumerate() {
             let Some(far) = matched.and_then(|s| s.landmark) else { continue };
             match map.keyframe(keyframe).and_then(|k| k.landmarks.get(feature).copied()) {

@@ -80,7 +80,7 @@ pub(crate) fn relocalise(
     frame: &mut TrackedFrame,
     region: Option<&SearchRegion>,
 ) -> bool {
-    let Context { sensor: _, config } = context;
+    let config = &context.config;
     let c = &config.places;
     let candidates = recogniser.candidates(c, map, &frame.features, |_| true);
     let needed = Support { inliers: c.relocalise_min_inliers, match_ratio: c.relocalise_min_match_ratio };
@@ -129,7 +129,7 @@ impl LoopCloser {
         map: &mut Map,
         keyframe: KeyFrameId,
     ) -> Option<LoopClosure> {
-        let Context { sensor: _, config } = context;
+        let config = &context.config;
         let k = map.keyframe(keyframe)?;
         let (sequence, estimated) = (k.sequence, k.t_cam_world);
         if self.last_loop.is_some_and(|last| sequence < last + config.loops.min_keyframes_between) {
@@ -176,7 +176,7 @@ impl LoopCloser {
         keyframe: KeyFrameId,
         candidate: &Candidate,
     ) -> Option<Similarity> {
-        let Context { sensor, config: _ } = context;
+        let sensor = &context.sensor;
         if sensor.measures_depth {
             return Some(unscaled(&self.frame.t_cam_world));
         }

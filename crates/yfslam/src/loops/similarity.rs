@@ -85,7 +85,7 @@ mod tests {
     /// among the candidate's landmarks.
     fn scene_with_similarity(s_near_candidate: &Similarity) -> (Context, Map, KeyFrameId, Candidate, TrackedFrame) {
         let mut config = Config::default();
-        // The scene has depths; all are beyond this range.
+        // All depths of the scene are beyond this range, so that none is used.
         (config.depth.source, config.depth.max_m) = (DepthSource::Motion, 1.0);
         let context = Context::new(&camera(), &config, &[1.0]);
         let (scene, mut map) = (Scene::new(), Map::default());

@@ -22,9 +22,9 @@ use crate::tracking::{Match, TrackedFrame};
 pub(super) struct Support {
     /// Number of inliers.
     pub inliers: usize,
-    /// Number of inliers with a similar descriptor, divided by the number that tracking would find from this pose: the landmarks in
-    /// view that are not behind moving objects, each weighted with its found ratio. In corridors with repeated doors and lamps many
-    /// landmarks are inliers of a wrong pose, but more are missing.
+    /// Match ratio: the number of inliers with a similar descriptor, divided by the number that tracking would find from this pose.
+    /// That is the sum of the found ratios of the landmarks in view that are not behind moving objects. In corridors with repeated
+    /// doors and lamps many landmarks are inliers of a wrong pose, but more are missing.
     pub match_ratio: f64,
 }
 
