@@ -1,6 +1,6 @@
-//! Feature extraction of one 640×480 picture: `cargo bench -p yfslam`.
+//! Feature extraction of one image of 640×480 px: `cargo bench -p yfslam`.
 //!
-//! The picture is a field of random squares of several sizes, or the PGM file that `YFSLAM_PICTURE` names.
+//! The image shows random squares of several sizes, or is the PGM file that `YFSLAM_IMAGE` names.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -14,6 +14,7 @@ use yfslam::unstable::{GrayImage, gray_from_rgb};
 #[path = "../examples/pgm/mod.rs"]
 mod pgm;
 
+/// Returns an image of random squares.
 fn squares() -> GrayImage {
     let mut image = GrayImage::new(640, 480);
     let mix = |v: u32| (v ^ v >> 15).wrapping_mul(0x85eb_ca6b) ^ v >> 13;
@@ -27,7 +28,7 @@ fn squares() -> GrayImage {
 }
 
 fn extraction(criterion: &mut Criterion) {
-    let picture = match std::env::var_os("YFSLAM_PICTURE") {
+    let image = match std::env::var_os("YFSLAM_IMAGE") {
         Some(path) => pgm::read(Path::new(&path)).unwrap_or_else(|_| squares()),
         None => squares(),
     };
@@ -35,7 +36,7 @@ fn extraction(criterion: &mut Criterion) {
     for count in [1000, 2000] {
         let mut extractor = OrbExtractor::new(&FeatureConfig { count, ..Default::default() });
         criterion.bench_function(&format!("extract {count} features"), |bencher| {
-            bencher.iter(|| extractor.extract(black_box(&picture), &mut features));
+            bencher.iter(|| extractor.extract(black_box(&image), &mut features));
         });
     }
     let color = RgbImage::new(640, 480);

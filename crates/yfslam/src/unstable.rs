@@ -30,7 +30,7 @@ impl PlaceProbe {
     pub fn new(config: &Config, camera: &Camera, map: &Map) -> Self {
         let extractor = OrbExtractor::new(&config.features);
         let mut recogniser = PlaceRecogniser::default();
-        map.keyframes().for_each(|(id, _)| recogniser.learn(map, id));
+        map.keyframes().for_each(|(id, _)| recogniser.add_keyframe(map, id));
         Self {
             context: Context::new(camera, config, extractor.scale_factors()),
             recogniser,

@@ -1,4 +1,5 @@
-//! The per-frame path reuses its buffers. One test function: the counter is the whole process's.
+//! A frame that is no keyframe allocates no memory. There is one test function only, because the counter is that of the whole
+//! process.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::error::Error;
@@ -9,15 +10,16 @@ use yfslam::config::FeatureConfig;
 use yfslam::unstable::{Features, GrayImage, OrbExtractor, gray_from_rgb};
 use yfslam::{BoundingBox, Camera, Config, DepthImage, DepthSource, Detection, Frame, Image, Method, RgbImage, Slam};
 
+/// An allocator that counts its calls.
 struct Counting;
 
 static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 
-// SAFETY: every call is handed on to the system's allocator unchanged.
+// SAFETY: every call is passed to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are those `System` asks for.
+        // SAFETY: the caller meets the conditions of `System`.
         unsafe { System.alloc(layout) }
     }
 
@@ -36,7 +38,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Random fields of 8 × 8 px.
+/// Returns an image of random squares of 8 × 8 px.
 fn texture(seed: u32) -> RgbImage {
     let mut image = RgbImage::new(640, 480);
     for (pixel, i) in image.data_mut().iter_mut().zip(0u32..) {
@@ -58,7 +60,7 @@ fn a_frame_that_is_no_keyframe_allocates_nothing() -> Result<(), Box<dyn Error>>
     Ok(())
 }
 
-/// A camera at rest before a wall, a person's box in the picture.
+/// Tracks a static camera in front of a wall, with the detection of a person in the image.
 fn tracking_allocates_nothing_between_keyframes(method: Method, source: DepthSource) -> Result<(), Box<dyn Error>> {
     let camera = Camera::pinhole(640, 480, 535.4, 539.2, 320.1, 247.6);
     let mut config = Config::default();
@@ -70,7 +72,7 @@ fn tracking_allocates_nothing_between_keyframes(method: Method, source: DepthSou
     let bbox = BoundingBox { x_min: 100.0, y_min: 50.0, x_max: 250.0, y_max: 470.0 };
     let color = Arc::new(texture(3));
     let mut right = RgbImage::new(640, 480);
-    // The wall stands 40 px of disparity away.
+    // The wall has a disparity of 40 px.
     (0..480).for_each(|y| right.row_mut(y)[..600].copy_from_slice(&color.row(y)[40..]));
     let mut frame = Frame::rgbd(0, color, DepthImage { raw, metres_per_unit: 1.0 / 5000.0 })
         .with_detections(vec![Detection { class: 0, score: 0.9, bbox }]);
@@ -83,7 +85,8 @@ fn tracking_allocates_nothing_between_keyframes(method: Method, source: DepthSou
         let allocations = ALLOCATIONS.load(Ordering::Relaxed) - before;
         assert!(tracked.t_world_cam.is_some());
         last_keyframe = if tracked.is_keyframe { i } else { last_keyframe };
-        // The list of tracked frames grows by doubling: at 16, 32 and 64; and the frame after a keyframe sees more landmarks than any before.
+        // The list of tracked frames doubles its capacity at 16, 32 and 64 frames, and the frame after a keyframe observes more
+        // landmarks than any before.
         if i > 20 && i > last_keyframe + 1 && i != 32 {
             assert_eq!(allocations, 0, "frame {i} of {method:?}, {source:?}");
             quiet += 1;

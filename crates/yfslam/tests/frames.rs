@@ -1,4 +1,4 @@
-//! What comes with a frame besides its picture: masks of movable objects, and depth that may be left unused.
+//! The inputs of a frame besides its image: masks of movable objects, depth, the right image, detections.
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use yfslam::{
     SetupError, Slam,
 };
 
-/// A grained picture of a wall, with a mask of the given width.
+/// Returns a frame of a textured wall, with a mask of the given width.
 fn frame(timestamp_ns: i64, mask_width: usize) -> Frame {
     let grain = |i: usize| {
         let mixed = ((i / 640 / 6 * 107 + i % 640 / 6) as u32).wrapping_mul(0x9e37_79b1);
@@ -45,20 +45,20 @@ fn features_on_a_mask_are_distrusted_and_a_mask_of_another_size_is_refused() {
 }
 
 #[test]
-fn depth_is_used_only_where_it_is_to_come_from_an_image() {
-    for (source, tracks) in [(DepthSource::Image, true), (DepthSource::Motion, false)] {
+fn depth_images_are_used_only_if_the_configuration_says_so() {
+    for (source, is_tracked) in [(DepthSource::Image, true), (DepthSource::Motion, false)] {
         let mut config = Config::default();
         config.depth.source = source;
         config.dynamic.method = Method::None;
         let mut slam = Slam::builder(camera()).config(config).build().unwrap();
         let tracked = slam.track(&frame(0, 640)).unwrap();
-        assert_eq!(tracked.t_world_cam.is_some(), tracks, "{source:?}");
-        assert!(slam.features().iter().all(|f| f.depth_m.is_some() == tracks), "{source:?}");
+        assert_eq!(tracked.t_world_cam.is_some(), is_tracked, "{source:?}");
+        assert!(slam.features().iter().all(|f| f.depth_m.is_some() == is_tracked), "{source:?}");
     }
 }
 
 #[test]
-fn a_frame_without_a_right_picture_is_refused_where_depth_is_to_come_from_one() {
+fn stereo_refuses_a_frame_without_a_right_image() {
     let mut config = Config::default();
     config.depth.source = DepthSource::Stereo;
     let mut slam = Slam::builder(camera()).config(config).build().unwrap();
@@ -69,7 +69,7 @@ fn a_frame_without_a_right_picture_is_refused_where_depth_is_to_come_from_one() 
     assert!(matches!(Slam::builder(lens).config(config).build(), Err(SetupError::NotRectified(_))));
 }
 
-/// A wall that stereo sees at 52 px of disparity and another, below, at 26 px.
+/// Returns a stereo frame of two walls: above with a disparity of 52 px, below with 26 px.
 fn pair(timestamp_ns: i64) -> Frame {
     let left = frame(timestamp_ns, 640);
     let mut right = RgbImage::new(640, 480);
@@ -94,29 +94,29 @@ fn stereo_depth_is_baseline_times_focal_length_by_disparity_the_same_on_every_ru
     };
     let features = run();
     assert_eq!(features, run());
-    // Patches near the step see both walls.
-    let clear = features.iter().filter(|f| (f.v - 240.0).abs() > 80.0);
-    let (mut right, mut found, mut all) = (0, 0, 0);
-    for f in clear.filter(|f| f.u > 130.0) {
+    // Patches near the step contain both walls.
+    let off_step = features.iter().filter(|f| (f.v - 240.0).abs() > 80.0);
+    let (mut correct, mut found, mut all) = (0, 0, 0);
+    for f in off_step.filter(|f| f.u > 130.0) {
         let wanted_m = if f.v < 240.0 { 1.0 } else { 2.0 };
         all += 1;
         found += usize::from(f.depth_m.is_some());
-        right += usize::from(f.depth_m.is_some_and(|z| (z / wanted_m - 1.0).abs() < 0.03));
+        correct += usize::from(f.depth_m.is_some_and(|z| (z / wanted_m - 1.0).abs() < 0.03));
     }
-    // Of so many like corners not always the same are chosen in both pictures.
-    assert!(found * 2 > all && right * 50 > found * 49, "{right} right of {found} found of {all}");
+    // The extractor does not always choose the same ones of so many similar corners in both images.
+    assert!(found * 2 > all && correct * 50 > found * 49, "{correct} correct of {found} found of {all}");
 }
 
-/// A wall 1.8 m away, before it a thing 1 m away or, later, other parts of the wall.
-fn with_thing(timestamp_ns: i64, thing: bool) -> Frame {
+/// Returns a frame of a wall 1.8 m away with an object 1 m away in front of it or, later, other parts of the wall.
+fn with_object(timestamp_ns: i64, has_object: bool) -> Frame {
     let mut frame = frame(timestamp_ns, 640);
     let (mut color, mut depth) = (frame.color.as_ref().clone(), frame.depth.as_deref().unwrap().clone());
     for y in 160..320 {
-        // Something else to see than in the rest, and than before.
-        let from = if thing { y - 150 } else { y + 150 };
+        // Another texture than in the rest and than before.
+        let from = if has_object { y - 150 } else { y + 150 };
         let other = frame.color.row(from)[7..167].to_vec();
         color.row_mut(y)[240..400].copy_from_slice(&other);
-        if thing {
+        if has_object {
             depth.raw.row_mut(y)[240..400].fill(5000);
         }
     }
@@ -125,24 +125,24 @@ fn with_thing(timestamp_ns: i64, thing: bool) -> Frame {
 }
 
 #[test]
-fn full_forgets_what_is_gone_after_half_a_second_and_nothing_that_stands() {
-    for (method, forgets) in [(Method::Full, true), (Method::None, false)] {
+fn full_removes_the_landmarks_of_an_object_that_has_left_and_no_others() {
+    for (method, removes) in [(Method::Full, true), (Method::None, false)] {
         let mut config = Config::default();
         config.dynamic.method = method;
         let mut slam = Slam::builder(camera()).config(config).build().unwrap();
-        let mut see = |i: i64, thing: bool| {
-            assert!(slam.track(&with_thing(i * 33_000_000, thing)).unwrap().t_world_cam.is_some());
+        let mut track = |i: i64, has_object: bool| {
+            assert!(slam.track(&with_object(i * 33_000_000, has_object)).unwrap().t_world_cam.is_some());
             let near = slam.map().landmarks().filter(|(_, l)| l.position.z < 1.2).count();
             (near, slam.map().landmarks().count())
         };
-        let (static_objects, all) = (0..5).map(|i| see(i, true)).last().unwrap();
-        assert!(static_objects > 30 && all > static_objects + 200, "{static_objects} {all}");
-        let (left, others) = (5..25).map(|i| see(i, false)).last().unwrap();
-        assert!((left == 0) == forgets && others >= all - static_objects, "{method:?}: {left} {others}");
+        let (before, all) = (0..5).map(|i| track(i, true)).last().unwrap();
+        assert!(before > 30 && all > before + 200, "{before} {all}");
+        let (left, others) = (5..25).map(|i| track(i, false)).last().unwrap();
+        assert!((left == 0) == removes && others >= all - before, "{method:?}: {left} {others}");
     }
 }
 
-/// A wall beside a screen that shows something else in each frame.
+/// Returns a frame of a wall beside a screen with another image in each frame.
 fn beside_screen(i: i64, is_person: bool) -> Frame {
     let mut frame = frame(i * 33_000_000, 640);
     let (mut color, mut depth) = (frame.color.as_ref().clone(), frame.depth.as_deref().unwrap().clone());
@@ -160,7 +160,7 @@ fn beside_screen(i: i64, is_person: bool) -> Frame {
 }
 
 #[test]
-fn full_does_not_lose_the_camera_when_all_that_stands_is_taken_for_a_person() {
+fn full_keeps_tracking_when_a_false_detection_covers_the_static_scene() {
     for (doubted_trust, is_lost) in [(0.0, true), (FullConfig::default().doubted_trust, false)] {
         let mut config = Config::default();
         config.dynamic.method = Method::Full;
@@ -171,7 +171,7 @@ fn full_does_not_lose_the_camera_when_all_that_stands_is_taken_for_a_person() {
         assert_eq!(poses[5..].iter().any(Option::is_none), is_lost, "{doubted_trust}: {poses:?}");
         let off_m = poses.iter().flatten().map(|pose| pose.translation.vector.norm()).fold(0.0, f64::max);
         assert!(off_m < 0.02, "{doubted_trust}: {off_m}");
-        // The map knows the wall: the box is false, and ignored from then on.
+        // The landmarks of the wall show that the box is false; it is then ignored.
         let features = &slam.features();
         let mut on_wall = features.iter().filter(|f| f.raw[0] < 460.0);
         assert!(is_lost || on_wall.clone().count() > 100 && on_wall.all(|f| f.trust == 1.0));

@@ -46,7 +46,7 @@ impl Backend {
     pub(crate) fn new(context: Arc<Context>, map: Map) -> Self {
         let mut recogniser = PlaceRecogniser::default();
         for (id, _) in map.keyframes() {
-            recogniser.learn(&map, id);
+            recogniser.add_keyframe(&map, id);
         }
         let recogniser = Arc::new(Mutex::new(recogniser));
         Self { context, map, mapper: Mapper::default(), recogniser, loops: LoopCloser::default() }
@@ -63,7 +63,7 @@ impl Backend {
         let keyframe = self.mapper.insert(&self.context, &mut self.map, frame, color);
         let mapping = started.elapsed();
         // A panic elsewhere left the index usable: at worst it lacks a landmark.
-        self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).learn(&self.map, keyframe);
+        self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).add_keyframe(&self.map, keyframe);
         let mut loop_closure = None;
         if self.context.config.loops.enabled {
             loop_closure = self.loops.close(&self.context, &self.recogniser, &mut self.map, keyframe);
@@ -75,7 +75,7 @@ impl Backend {
     fn begin(&mut self, start: &TwoViewMap) -> Inserted {
         let started = Instant::now();
         let keyframe = self.mapper.begin(&self.context.sensor, &mut self.map, start);
-        self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).learn(&self.map, keyframe);
+        self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).add_keyframe(&self.map, keyframe);
         Inserted { keyframe, loop_closure: None, mapping: started.elapsed(), loops: Duration::ZERO }
     }
 

@@ -1,26 +1,27 @@
 //! A coloured point cloud: one point for each occupied voxel.
 //!
-//! In: a dense_map and its volume. Out: the mean of the readings in each occupied voxel, those without enough occupied neighbours left out.
+//! In: a dense map and its volume. Out: the mean of the readings in each occupied voxel; voxels with too few occupied neighbours
+//! are left out as outliers.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::dense::voxels::{Block, VOXELS, Voxel, block_of, place_of, voxel_at, voxel_in};
+use crate::dense::voxels::{Block, VOXELS, Voxel, block_of, index_in_block, voxel_at, voxel_in};
 use crate::dense::{DenseMap, Volume};
 
 /// A point of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CloudPoint {
-    /// The voxel that it stands for.
+    /// Its voxel.
     pub voxel: Voxel,
-    /// Where it is, m, in the frame of the volume.
+    /// Position in the frame of the volume, m.
     pub position_m: [f32; 3],
     /// Red, green, blue.
     pub color: [u8; 3],
 }
 
-/// Sums over the readings in a voxel: offsets from its block in voxels, colour, count.
+/// Sums over the readings in a voxel: offsets from the voxel's corner in voxels, colour, count.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sum {
     offset: [f32; 3],
@@ -28,27 +29,28 @@ struct Sum {
     count: u32,
 }
 
-/// The cloud of a dense_map, ordered by block, then by place in it. `progress` hears how many patches are done.
+/// Returns the cloud of a dense map, ordered by block, then by index in the block. `progress` receives the number of finished
+/// patches.
 pub fn cloud(dense_map: &DenseMap, volume: &Volume, mut progress: impl FnMut(usize)) -> Vec<CloudPoint> {
     let config = volume.config();
     let per_m = 1.0 / config.resolution_m;
     let mut sums: BTreeMap<Block, Vec<Sum>> = BTreeMap::new();
-    for (number, one) in dense_map.patches.iter().enumerate() {
+    for (number, placed) in dense_map.patches.iter().enumerate() {
         progress(number);
         let Some(pose) = volume.pose(number) else { continue };
         let pose: Isometry3<f32> = pose.cast();
-        for (p, color) in one.patch.points(&dense_map.grid, config.max_range_m) {
+        for (p, color) in placed.patch.points(&dense_map.grid, config.max_range_m) {
             let p = pose * p;
             let voxel = voxel_at(&p, per_m);
             let block = block_of(voxel);
             let sums = sums.entry(block).or_insert_with(|| vec![Sum::default(); VOXELS]);
-            sums[place_of(voxel)].add(&p, per_m, voxel, color);
+            sums[index_in_block(voxel)].add(&p, per_m, voxel, color);
         }
     }
     let mut points = Vec::new();
     for (block, sums) in &sums {
-        for (place, sum) in sums.iter().enumerate().filter(|(_, sum)| sum.count > 0) {
-            let voxel = voxel_in(*block, place);
+        for (index, sum) in sums.iter().enumerate().filter(|(_, sum)| sum.count > 0) {
+            let voxel = voxel_in(*block, index);
             if volume.is_occupied(voxel) && neighbours(volume, voxel) >= config.min_neighbours {
                 points.push(sum.mean(voxel, config.resolution_m));
             }
@@ -57,13 +59,13 @@ pub fn cloud(dense_map: &DenseMap, volume: &Volume, mut progress: impl FnMut(usi
     points
 }
 
-/// Bytes of memory that the sums of a cloud take.
+/// Returns the memory that the sums of a cloud take, bytes.
 pub(crate) fn bytes(volume: &Volume) -> usize {
-    let shows_surface = |block: &Block| volume.voxels_in(*block).any(|known| known.occupied);
-    volume.blocks().filter(shows_surface).count() * VOXELS * size_of::<Sum>()
+    let has_surface = |block: &Block| volume.voxels_in(*block).any(|known| known.occupied);
+    volume.blocks().filter(has_surface).count() * VOXELS * size_of::<Sum>()
 }
 
-/// Occupied voxels among the 26 around one.
+/// Returns the number of occupied voxels among the 26 neighbours of a voxel.
 pub(crate) fn neighbours(volume: &Volume, [x, y, z]: Voxel) -> usize {
     let around = (0..27).filter(|i| *i != 13).map(|i| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1]);
     around.filter(|voxel| volume.is_occupied(*voxel)).count()

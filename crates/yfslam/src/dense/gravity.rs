@@ -1,18 +1,18 @@
-//! Which way is up: no sensor tells of gravity.
+//! The up direction of a dense map, without a gravity sensor.
 //!
-//! In: patches with their poses. Out: a rotation after which the z-axis points up, x to the front of the first picture and y to its left
-//! (ROS, REP 103). Floors, tables and ceilings are level: of all directions near the upright of the first picture, up is the one along
-//! which most points share their heights.
+//! In: patches with their poses. Out: a rotation after which the z-axis points up, x to the front of the first image and y to its
+//! left (ROS, REP 103). Floors, tables and ceilings are level: of all directions near the vertical of the first image, up is the
+//! one along which most points share their heights.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::dense::DenseMap;
 
-/// Angle to the upright of the first picture within which up is sought, degrees.
+/// Greatest angle between the up direction and the vertical of the first image, degrees.
 const SEARCH_DEG: f64 = 30.0;
 /// Thickness of the layers in which heights are counted, m.
 const LAYER_M: f64 = 0.03;
-/// Points that are asked at most.
+/// Number of points that are used at most.
 const POINTS: usize = 20_000;
 
 /// Which direction of the world becomes the z-axis of a dense map.
@@ -35,12 +35,12 @@ pub(crate) fn turn(dense_map: &DenseMap, up: Up) -> UnitQuaternion<f64> {
     }
 }
 
-/// Up as in a picture taken upright: camera x right, y down, z forward become y negative, z negative, x.
+/// Returns the rotation for an upright first image: camera x right, y down, z forward become y negative, z negative, x.
 pub(crate) fn of_camera() -> UnitQuaternion<f64> {
     from_up(&-Vector3::y())
 }
 
-/// The rotation that turns direction `up` of the world to z, and the world's z-axis, as far as it is level, to x.
+/// Returns the rotation that turns direction `up` of the world to z, and the horizontal part of the world's z-axis to x.
 pub(crate) fn from_up(up: &Vector3<f64>) -> UnitQuaternion<f64> {
     let z = up.try_normalize(1e-9).unwrap_or(-Vector3::y());
     let level = |v: Vector3<f64>| (v - z * z.dot(&v)).try_normalize(0.1);
@@ -49,13 +49,13 @@ pub(crate) fn from_up(up: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows))
 }
 
-/// Up by the level surfaces that the patches show; that of the first picture if they show none.
+/// Returns the rotation from the level surfaces of the patches; that for an upright first image if there are none.
 pub(crate) fn of_dense_map(dense_map: &DenseMap) -> UnitQuaternion<f64> {
     let points = sample(dense_map);
     let first = dense_map.patches.first().map_or(-Vector3::y(), |patch| patch.t_world_cam * -Vector3::y());
     let mut best = (levelness(&points, &first), first);
     let mut reach = SEARCH_DEG.to_radians();
-    // Rings of directions around the best one, ever closer.
+    // Search on rings of directions around the best one, with decreasing radius.
     while reach > 0.001 {
         let center = best.1;
         let side = if center.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
@@ -78,8 +78,8 @@ pub(crate) fn of_dense_map(dense_map: &DenseMap) -> UnitQuaternion<f64> {
     from_up(&best.1)
 }
 
-/// Height above which hardly anything is and below which hardly anything: the floor, m along the z-axis of a turned world. The lowest
-/// layer with at least a tenth of the fullest one's points.
+/// Returns the height of the floor, m along the z-axis of a turned world: the lowest layer with at least a tenth of the points of
+/// the fullest one.
 pub(crate) fn floor_m(dense_map: &DenseMap, turned: &UnitQuaternion<f64>) -> Option<f64> {
     let points: Vec<_> = sample(dense_map).into_iter().map(|p| turned * p).collect();
     let counts = layers(&points, &Vector3::z());
@@ -88,6 +88,7 @@ pub(crate) fn floor_m(dense_map: &DenseMap, turned: &UnitQuaternion<f64>) -> Opt
     Some((*layer as f64 + 0.5) * LAYER_M)
 }
 
+/// Returns static points of the patches in the world, m.
 fn sample(dense_map: &DenseMap) -> Vec<Vector3<f64>> {
     let cells = dense_map.patches.len() * dense_map.grid.rays().len();
     let step = (cells / POINTS).max(1);
@@ -98,6 +99,7 @@ fn sample(dense_map: &DenseMap) -> Vec<Vector3<f64>> {
     points.step_by(step).collect()
 }
 
+/// Returns the number of points in each layer of heights.
 fn layers(points: &[Vector3<f64>], up: &Vector3<f64>) -> std::collections::BTreeMap<i64, usize> {
     let mut counts = std::collections::BTreeMap::new();
     for p in points {
@@ -106,7 +108,7 @@ fn layers(points: &[Vector3<f64>], up: &Vector3<f64>) -> std::collections::BTree
     counts
 }
 
-/// How much points share their heights: pairs in the same layer.
+/// Returns how far points share their heights: the number of pairs in the same layer.
 fn levelness(points: &[Vector3<f64>], up: &Vector3<f64>) -> usize {
     layers(points, up).values().map(|count| count * count).sum()
 }
@@ -118,7 +120,7 @@ mod tests {
     use crate::dense::scene;
 
     #[test]
-    fn an_upright_picture_gives_the_axes_of_ros() {
+    fn an_upright_image_gives_the_axes_of_ros() {
         let turn = of_camera();
         let close = |a: Vector3<f64>, b: Vector3<f64>| assert!((a - b).norm() < 1e-9, "{a} {b}");
         close(turn * Vector3::z(), Vector3::x());
@@ -126,7 +128,7 @@ mod tests {
         close(turn * Vector3::y(), -Vector3::z());
     }
 
-    /// A camera that looks down by `pitch` at a floor 1.2 m below it.
+    /// Returns a dense map of a floor 1.2 m below a camera that is tilted down by `pitch`.
     fn floor(pitch: f64) -> DenseMap {
         let grid = CellGrid::new(&scene::camera(), 2);
         let (sin, cos) = pitch.sin_cos();
@@ -139,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_floor_seen_by_a_camera_that_looks_down_says_where_up_is() {
+    fn the_floor_gives_the_up_direction_of_a_tilted_camera() {
         let (dense_map, pitch) = (floor(0.35), 0.35f64);
         let turn = of_dense_map(&dense_map);
         // The floor's normal in the frame of the camera.

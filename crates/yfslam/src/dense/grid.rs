@@ -1,6 +1,6 @@
-//! A grid to drive in: what stands between two heights, seen from above.
+//! The ground grid for navigation: obstacles between two heights, projected onto the ground.
 //!
-//! In: a volume whose z-axis points up. Out: for each column whether something is in the way, nothing is, or nobody knows.
+//! In: a volume whose z-axis points up. Out: whether each column is occupied, free or unknown.
 
 use std::collections::BTreeMap;
 
@@ -8,22 +8,22 @@ use crate::dense::Volume;
 use crate::dense::cloud::neighbours;
 use crate::dense::voxels::center_m;
 
-/// What is known of a column.
+/// The state of a column.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum GridCell {
-    /// Nothing.
+    /// No voxel of the column is known.
     #[default]
     Unknown,
-    /// Free as far as seen.
+    /// All known voxels of the column are free.
     Free,
-    /// Something is there.
+    /// A voxel of the column is occupied.
     Occupied,
 }
 
 /// A grid of columns.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GroundGrid {
-    /// Corner of the first cell, m: least x and y.
+    /// Corner of the first cell with the least x and y, m.
     pub origin_m: [f64; 2],
     /// Side of a cell, m.
     pub resolution_m: f64,
@@ -31,11 +31,12 @@ pub struct GroundGrid {
     pub width: usize,
     /// Cells along y.
     pub height: usize,
-    /// Row by row, least y first.
+    /// States, row by row, least y first.
     pub cells: Vec<GridCell>,
 }
 
-/// The grid of what is between the heights `low_m` and `high_m`. Voxels with few occupied neighbours are taken for outliers.
+/// Returns the grid of what is between the heights `low_m` and `high_m`. Voxels with too few occupied neighbours are outliers and
+/// count as free.
 pub fn ground_grid(volume: &Volume, [low_m, high_m]: [f32; 2]) -> GroundGrid {
     let config = volume.config();
     let mut columns: BTreeMap<[i32; 2], GridCell> = BTreeMap::new();
@@ -44,10 +45,10 @@ pub fn ground_grid(volume: &Volume, [low_m, high_m]: [f32; 2]) -> GroundGrid {
         if z < low_m || z > high_m {
             continue;
         }
-        let stands = known.occupied && neighbours(volume, known.voxel) >= config.min_neighbours;
-        let says = if stands { GridCell::Occupied } else { GridCell::Free };
+        let is_obstacle = known.occupied && neighbours(volume, known.voxel) >= config.min_neighbours;
+        let state = if is_obstacle { GridCell::Occupied } else { GridCell::Free };
         let column = columns.entry([known.voxel[0], known.voxel[1]]).or_default();
-        *column = (*column).max(says);
+        *column = (*column).max(state);
     }
     let (Some(left), Some(right)) = (columns.keys().map(|c| c[0]).min(), columns.keys().map(|c| c[0]).max()) else {
         return GroundGrid { resolution_m: f64::from(config.resolution_m), ..Default::default() };
@@ -56,10 +57,10 @@ pub fn ground_grid(volume: &Volume, [low_m, high_m]: [f32; 2]) -> GroundGrid {
     let high = columns.keys().map(|c| c[1]).max().unwrap_or(0);
     let (width, height) = ((right - left + 1) as usize, (high - low + 1) as usize);
     let mut cells = vec![GridCell::Unknown; width * height];
-    for ([x, y], says) in columns {
-        cells[(y - low) as usize * width + (x - left) as usize] = says;
+    for ([x, y], state) in columns {
+        cells[(y - low) as usize * width + (x - left) as usize] = state;
     }
-    // As the user wrote it, not as a float of 32 bits has it.
+    // The decimal value that the user wrote, not its 32-bit approximation.
     let resolution_m = (f64::from(config.resolution_m) * 1e6).round() / 1e6;
     let origin_m = [left, low].map(|v| f64::from(v) * resolution_m);
     GroundGrid { origin_m, resolution_m, width, height, cells }
@@ -74,7 +75,7 @@ mod tests {
     use crate::geometry::Pose;
 
     #[test]
-    fn a_wall_ahead_is_in_the_way_and_the_space_before_it_is_free() {
+    fn a_wall_is_occupied_and_the_space_before_it_is_free() {
         let config = DenseConfig::default();
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
         let patch = scene::wall(&grid, 2.02, None);
@@ -88,7 +89,7 @@ mod tests {
         };
         assert_eq!(at(2.03, 0.1), GridCell::Occupied);
         assert_eq!(at(1.0, 0.1), GridCell::Free);
-        assert_eq!(at(0.5, 1.0), GridCell::Unknown, "beside the view");
+        assert_eq!(at(0.5, 1.0), GridCell::Unknown, "outside the field of view");
         assert_eq!(ground.cells.len(), ground.width * ground.height);
     }
 }

@@ -1,7 +1,7 @@
-//! A keyframe's patch of the dense map: its depth and colour on a coarser grid, without edges, with what moves marked.
+//! A keyframe patch: depth and colour of a keyframe on a coarse grid, without depth edges, with moving cells marked.
 //!
-//! In: a frame, and which of its pixels move. Out: cells with depth, in the frame of the camera. A patch knows nothing of where the
-//! camera was: it hangs on its keyframe.
+//! In: a frame, and its pixels that move. Out: cells with depth, in the camera frame. A patch has no pose of its own: it follows
+//! the pose of its keyframe.
 
 use nalgebra::Point3;
 
@@ -9,9 +9,9 @@ use crate::camera::Camera;
 use crate::dense::DenseConfig;
 use crate::image::{DepthImage, RgbImage};
 
-/// Depth unit of a cell, m: half a millimetre, finer than any sensor's step.
+/// Depth unit of a cell, m: half a millimetre, less than the depth step of any sensor.
 const UNIT_M: f32 = 0.0005;
-/// Marks a cell whose surface moves.
+/// Bit that marks a cell whose surface moves.
 const MOVING: u16 = 1 << 15;
 
 /// The grid of cells that all patches of a camera share, and the viewing ray of each cell.
@@ -21,14 +21,14 @@ pub struct CellGrid {
     rows: usize,
     stride_px: usize,
     camera: Camera,
-    /// x = X/Z and y = Y/Z of each cell's middle, lens distortion removed.
+    /// x = X/Z and y = Y/Z of each cell's centre, undistorted.
     rays: Vec<[f32; 2]>,
-    /// Least and greatest of them: beyond, the lens model folds back into the picture.
+    /// Least and greatest x and y: beyond them the lens model folds back into the image.
     bounds: [[f32; 2]; 2],
 }
 
 impl CellGrid {
-    /// The grid of cells of `stride_px` pixels in the images of a camera.
+    /// Returns the grid of cells of `stride_px` pixels in the images of a camera.
     pub fn new(camera: &Camera, stride_px: usize) -> Self {
         let stride_px = stride_px.max(1);
         let (columns, rows) = (camera.width / stride_px, camera.height / stride_px);
@@ -43,39 +43,39 @@ impl CellGrid {
         Self { columns, rows, stride_px, camera: camera.clone(), rays, bounds }
     }
 
-    /// Cells per row.
+    /// Returns the number of cells in a row.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// Rows of cells.
+    /// Returns the number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Pixels along each side of a cell.
+    /// Returns the pixels along each side of a cell.
     pub fn stride_px(&self) -> usize {
         self.stride_px
     }
 
-    /// The camera.
+    /// Returns the camera.
     pub(crate) fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// Viewing ray of each cell, (X/Z, Y/Z), row-major.
+    /// Returns the viewing ray of each cell, (X/Z, Y/Z), row-major.
     pub fn rays(&self) -> &[[f32; 2]] {
         &self.rays
     }
 
-    /// Middle of a cell, px of the raw image.
+    /// Returns the centre of a cell, px of the raw image.
     pub fn middle_px(&self, cell: usize) -> [f32; 2] {
         let half = 0.5 * (self.stride_px - 1) as f32;
         [cell % self.columns, cell / self.columns].map(|at| (at * self.stride_px) as f32 + half)
     }
 
-    /// Position of a point of the camera frame on the grid, in cells, the middle of the first cell being (0, 0); `None` behind the
-    /// camera or outside the grid.
+    /// Returns the position of a point of the camera frame on the grid, in cells; the centre of the first cell is (0, 0). `None`
+    /// behind the camera or outside the grid.
     pub fn project(&self, p: &Point3<f32>) -> Option<[f32; 2]> {
         if p.z <= 0.0 {
             return None;
@@ -92,28 +92,29 @@ impl CellGrid {
     }
 }
 
-/// What a cell measured.
+/// The measurement of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reading {
     /// Depth along the optical axis, m.
     pub depth_m: f32,
-    /// Whether the surface moves: space before it is free, but it stays out of the map.
+    /// Whether the surface moves: the space before it is free, but the surface stays out of the map.
     pub moves: bool,
 }
 
-/// Cells with depth and colour. Made by [`KeyframePatch::extract`], or of what is known otherwise by [`KeyframePatch::of_depths`].
+/// Depth, colour and class of the cells of one keyframe; made by [`KeyframePatch::extract`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct KeyframePatch {
     /// Depth in [`UNIT_M`] and the mark [`MOVING`]; 0 where nothing was measured, or at an edge. Row-major.
     pub(crate) depth: Vec<u16>,
     /// Mean colour of the cell's pixels.
     pub(crate) color: Vec<[u8; 3]>,
-    /// Class of each cell's surface, 0 where it is unknown; empty where nobody looked.
+    /// Class of each cell's surface, 0 where it is unknown; empty if no detector searched for classes.
     pub(crate) class: Vec<u8>,
 }
 
 impl KeyframePatch {
-    /// Cuts the patch of a frame: `moves(position, edge)` tells whether a position of the image, px, is within `edge` px of what moves.
+    /// Extracts the patch of a frame; `moves(position, edge)` returns whether a position of the image, px, is within `edge` px of
+    /// something that moves.
     pub fn extract(
         config: &DenseConfig,
         grid: &CellGrid,
@@ -122,19 +123,19 @@ impl KeyframePatch {
         moves: impl Fn([f32; 2], f32) -> bool,
     ) -> Self {
         let rough = cell_depths(config, grid, depth);
-        let metres = smoothed(config, grid, &rough);
-        let mut cells = Vec::with_capacity(metres.len());
-        for (i, &z) in metres.iter().enumerate() {
+        let depths_m = smoothed(config, grid, &rough);
+        let mut cells = Vec::with_capacity(depths_m.len());
+        for (i, &z) in depths_m.iter().enumerate() {
             let (column, row) = (i % grid.columns, i / grid.columns);
             let kept = z > 0.0 && !is_edge(config, grid, &rough, column, row);
-            // Colour of what moves has to be known as such even where it has no depth.
+            // A moving cell is marked even without depth, because its colour must not be used.
             let mark = if moves(grid.middle_px(i), config.edge_px) { MOVING } else { 0 };
             cells.push(if kept { ((z / UNIT_M + 0.5) as u16).min(MOVING - 1) | mark } else { mark });
         }
         Self { depth: cells, color: cell_colors(grid, color), class: Vec::new() }
     }
 
-    /// The patch of depths, m (0 where nothing was measured), that are exact and stand still, of one colour.
+    /// Returns a patch of static cells with exact depths, m (0 where nothing was measured), of one colour.
     #[cfg(test)]
     pub(crate) fn of_depths(depths_m: impl IntoIterator<Item = f32>, color: [u8; 3]) -> Self {
         let units = |z: f32| ((z / UNIT_M + 0.5) as u16).min(MOVING - 1);
@@ -142,19 +143,19 @@ impl KeyframePatch {
         Self { color: vec![color; depth.len()], depth, class: Vec::new() }
     }
 
-    /// The patch with classes: `class(position)` is that of what a position of the image, px, shows; 0 where that is unknown.
+    /// Returns the patch with classes; `class(position)` returns the class at a position of the image, px, 0 where it is unknown.
     pub fn with_classes(mut self, grid: &CellGrid, class: impl Fn([f32; 2]) -> u8) -> Self {
         let of_cell = |cell| self.surface_m(cell).map_or(0, |_| class(grid.middle_px(cell)));
         self.class = (0..self.depth.len()).map(of_cell).collect();
         self
     }
 
-    /// Bytes of memory that it takes.
+    /// Returns the memory that it takes, bytes.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(&*self.depth) + size_of_val(&*self.color) + self.class.len()
     }
 
-    /// What a cell measured; `None` where there is no depth.
+    /// Returns the measurement of a cell; `None` where there is no depth.
     #[inline]
     pub(crate) fn reading(&self, cell: usize) -> Option<Reading> {
         let value = *self.depth.get(cell)?;
@@ -162,29 +163,29 @@ impl KeyframePatch {
         (steps > 0).then(|| Reading { depth_m: f32::from(steps) * UNIT_M, moves: value & MOVING != 0 })
     }
 
-    /// Whether a cell shows something that moves, with depth or without.
+    /// Returns whether a cell shows something that moves, with or without depth.
     pub fn moves(&self, cell: usize) -> bool {
         self.depth.get(cell).is_some_and(|value| value & MOVING != 0)
     }
 
-    /// Depth of a static surface, m; `None` where there is none.
+    /// Returns the depth of a cell's static surface, m; `None` if there is none.
     #[inline]
     pub fn surface_m(&self, cell: usize) -> Option<f32> {
         self.reading(cell).filter(|reading| !reading.moves).map(|reading| reading.depth_m)
     }
 
-    /// Mean colour of a cell's pixels.
+    /// Returns the mean colour of a cell's pixels.
     pub fn color(&self, cell: usize) -> [u8; 3] {
         self.color.get(cell).copied().unwrap_or_default()
     }
 
-    /// Class of a cell's surface, 0 where it is unknown; `None` where nobody looked.
+    /// Returns the class of a cell's surface, 0 where it is unknown; `None` if no detector searched for classes.
     #[inline]
     pub(crate) fn class(&self, cell: usize) -> Option<u8> {
         self.class.get(cell).copied()
     }
 
-    /// Static points in the camera frame, with colour, up to `max_range_m` of depth.
+    /// Returns the static points in the camera frame, m, with colour, up to a depth of `max_range_m`.
     pub fn points<'a>(
         &'a self,
         grid: &'a CellGrid,
@@ -197,14 +198,14 @@ impl KeyframePatch {
     }
 }
 
-/// Difference in depth that makes an edge at `z`, m.
+/// Returns the depth difference that is an edge at depth `z`, m.
 fn edge_step_m(config: &DenseConfig, z: f32) -> f32 {
     config.edge_step_m + config.edge_step_share * z
 }
 
-/// Mean depth of each cell, m; 0 where its pixels have none or see an edge.
+/// Returns the mean depth of each cell, m; 0 where its pixels have no depth or an edge.
 fn cell_depths(config: &DenseConfig, grid: &CellGrid, depth: &DepthImage) -> Vec<f32> {
-    let mut metres = Vec::with_capacity(grid.columns * grid.rows);
+    let mut depths_m = Vec::with_capacity(grid.columns * grid.rows);
     for row in 0..grid.rows {
         let lines: Vec<&[u16]> = (0..grid.stride_px).map(|dy| depth.raw.row(row * grid.stride_px + dy)).collect();
         for column in 0..grid.columns {
@@ -219,20 +220,20 @@ fn cell_depths(config: &DenseConfig, grid: &CellGrid, depth: &DepthImage) -> Vec
             }
             let z = sum as f32 / count.max(1) as f32 * depth.metres_per_unit;
             let spread = f32::from(far.saturating_sub(near)) * depth.metres_per_unit;
-            metres.push(if count > 0 && spread <= edge_step_m(config, z) { z } else { 0.0 });
+            depths_m.push(if count > 0 && spread <= edge_step_m(config, z) { z } else { 0.0 });
         }
     }
-    metres
+    depths_m
 }
 
-/// Depth averaged along rows, then along columns, over what differs by no more than noise (a bilateral filter in two passes, as
-/// KinectFusion has one, ISMAR 2011, section 3.1).
-fn smoothed(config: &DenseConfig, grid: &CellGrid, metres: &[f32]) -> Vec<f32> {
-    let along = |from: &[f32], step: usize, place: &dyn Fn(usize) -> (usize, usize)| -> Vec<f32> {
+/// Returns the depth averaged along rows, then along columns, over differences within the noise (a bilateral filter in two passes,
+/// after KinectFusion, ISMAR 2011, section 3.1).
+fn smoothed(config: &DenseConfig, grid: &CellGrid, depths_m: &[f32]) -> Vec<f32> {
+    let average = |from: &[f32], step: usize, position: &dyn Fn(usize) -> (usize, usize)| -> Vec<f32> {
         let mean = |(i, &z): (usize, &f32)| {
-            let (at, length) = place(i);
+            let (at, length) = position(i);
             let half = (config.smooth_px_per_m * z / grid.stride_px as f32 + 0.5) as usize;
-            // As many on either side, so that slopes stay where they are.
+            // The same number of cells on both sides, so that slopes keep their position.
             let half = half.min(at).min(length - 1 - at);
             if z == 0.0 || half == 0 {
                 return z;
@@ -251,20 +252,21 @@ fn smoothed(config: &DenseConfig, grid: &CellGrid, metres: &[f32]) -> Vec<f32> {
         };
         from.iter().enumerate().map(mean).collect()
     };
-    let rows = along(metres, 1, &|i| (i % grid.columns, grid.columns));
-    along(&rows, grid.columns, &|i| (i / grid.columns, grid.rows))
+    let rows = average(depths_m, 1, &|i| (i % grid.columns, grid.columns));
+    average(&rows, grid.columns, &|i| (i / grid.columns, grid.rows))
 }
 
-/// Whether the depth around a cell jumps: sensors smear such edges over both sides.
-fn is_edge(config: &DenseConfig, grid: &CellGrid, metres: &[f32], column: usize, row: usize) -> bool {
-    let z = metres[row * grid.columns + column];
+/// Returns whether the depth around a cell has a step: sensors blur such edges over both sides.
+fn is_edge(config: &DenseConfig, grid: &CellGrid, depths_m: &[f32], column: usize, row: usize) -> bool {
+    let z = depths_m[row * grid.columns + column];
     let step = edge_step_m(config, z);
     let (left, right) = (column.saturating_sub(1), (column + 2).min(grid.columns));
     (row.saturating_sub(1)..(row + 2).min(grid.rows)).any(|r| {
-        metres[r * grid.columns + left..r * grid.columns + right].iter().any(|&n| n > 0.0 && (n - z).abs() > step)
+        depths_m[r * grid.columns + left..r * grid.columns + right].iter().any(|&n| n > 0.0 && (n - z).abs() > step)
     })
 }
 
+/// Returns the mean colour of each cell.
 fn cell_colors(grid: &CellGrid, color: &RgbImage) -> Vec<[u8; 3]> {
     let mut means = Vec::with_capacity(grid.columns * grid.rows);
     let pixels = (grid.stride_px * grid.stride_px) as u32;
@@ -290,10 +292,10 @@ mod tests {
     use crate::image::Image;
 
     #[test]
-    fn a_piece_keeps_surfaces_marks_what_moves_and_drops_edges() {
+    fn a_patch_keeps_surfaces_marks_what_moves_and_drops_edges() {
         let (config, camera) = (DenseConfig::default(), scene::camera());
         let grid = CellGrid::new(&camera, config.stride_px);
-        // A wall at 3 m with a box before it at 1 m, in millimetres.
+        // A wall at 3 m with a box in front of it at 1 m, in millimetres.
         let mut raw = Image::new(camera.width, camera.height);
         for y in 0..camera.height {
             raw.row_mut(y).iter_mut().enumerate().for_each(|(x, d)| *d = if x < 80 { 1000 } else { 3000 });
@@ -311,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_cell_sees_projects_back_to_it() {
+    fn a_point_on_the_ray_of_a_cell_projects_to_it() {
         let mut camera = scene::camera();
         camera.distortion = [0.04, -0.1, -0.0007, -0.0002, 0.05];
         let grid = CellGrid::new(&camera, 4);
@@ -322,7 +324,7 @@ mod tests {
             assert!((row - (cell / grid.columns()) as f32).abs() < 1e-2, "{cell}: {row}");
         }
         assert_eq!(grid.project(&Point3::new(0.0, 0.0, -1.0)), None);
-        // The lens model has these near the middle again.
+        // The lens model maps these back to near the centre.
         for x in [2.0, 3.0, 5.0] {
             assert_eq!(grid.project(&Point3::new(x, 0.1, 1.0)), None, "{x}");
         }

@@ -1,8 +1,8 @@
 //! The dense map while the system runs: keyframe patches with poses relative to keyframes, and the volume that follows them.
 //!
-//! In: patches with the keyframe that each belongs to, and the map whenever it was corrected. Out: a volume that is consistent with the
-//! trajectory at any time. With [`Execution::Inline`] a patch is entered at once; with [`Execution::Threaded`] on a thread of its own,
-//! which tracking never waits for: a patch that comes while two are waiting is left out.
+//! In: patches with the keyframe that each belongs to, and the map whenever it was corrected. Out: a volume that is consistent with
+//! the trajectory at any time. With [`Execution::Inline`] a patch is integrated at once; with [`Execution::Threaded`] on a thread
+//! of its own, for which tracking never waits: a patch is left out if two others are still in the queue.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,18 +22,18 @@ use crate::image::{DepthImage, RgbImage};
 use crate::map::{KeyFrameId, KeyframeRelativePose, Map};
 use crate::worker::{Execution, Worker};
 
-/// Patches that may wait for the thread.
-const WAITING: usize = 2;
+/// Length of the thread's queue.
+const QUEUE_LENGTH: usize = 2;
 
-/// Keeps the patches of keyframes at the poses that the map gives them.
+/// The patches of keyframes, and the volume that follows their poses in the map.
 pub(crate) struct DenseMapper {
     config: DenseConfig,
     grid: CellGrid,
     poses: Vec<KeyframeRelativePose>,
-    /// Time and pose, world from camera, of the last patch when it was extracted.
+    /// Time and pose, camera to world, of the last patch when it was extracted.
     last: Option<(i64, Pose)>,
     fusion: FusionOwner,
-    /// Memory of the patches.
+    /// Memory of the patches, bytes.
     bytes: usize,
     class_names: Vec<String>,
     /// The class in patches of each class of the detector; `None` where patches have no classes.
@@ -41,22 +41,22 @@ pub(crate) struct DenseMapper {
     patches_skipped: usize,
 }
 
-/// What a patch is extracted from.
+/// The data of a frame from which a patch is extracted.
 pub(crate) struct Source<'a> {
     /// The colour image.
     pub color: &'a RgbImage,
     /// The depth image.
     pub depth: &'a DepthImage,
-    /// What moves.
+    /// The pixels that move.
     pub moving: &'a MovingMask,
-    /// Detections of objects that cannot move; `None` where no detector searched for such.
+    /// Detections of objects that cannot move; `None` if no detector searched for them.
     pub objects: Option<&'a [Detection]>,
 }
 
 /// A patch with its time, ns; shared with snapshots.
 type TimedPatch = (i64, Arc<KeyframePatch>);
 
-/// Where the patches are kept and entered.
+/// The owner of patches and volume: this object or a thread.
 enum FusionOwner {
     Inline(Box<Fusion>),
     Threaded(Worker<Request, Answer>),
@@ -64,19 +64,19 @@ enum FusionOwner {
 
 /// A request to the thread.
 enum Request {
-    Place(Vec<TimedPatch>, Vec<Option<Pose>>),
+    Integrate(Vec<TimedPatch>, Vec<Option<Pose>>),
     Volume,
     Patches,
     Clear,
 }
 
-/// Its answer.
+/// An answer of the thread.
 enum Answer {
     Volume(Box<Volume>),
     Patches(Vec<TimedPatch>),
 }
 
-/// Patches and volume.
+/// Patches and the volume made of them.
 #[derive(Clone, Debug)]
 struct Fusion {
     grid: CellGrid,
@@ -87,7 +87,7 @@ struct Fusion {
 }
 
 impl DenseMapper {
-    /// Prepares for one camera. The z-axis of the volume points up in the first image, as in ROS (REP 103).
+    /// Returns a dense map for one camera. The z-axis of the volume points up in the first image, as in ROS (REP 103).
     ///
     /// # Errors
     /// For a value of the configuration out of range, or if a thread cannot be started.
@@ -98,9 +98,9 @@ impl DenseMapper {
             Fusion { grid: grid.clone(), up: gravity::of_camera(), patches: Vec::new(), volume: Volume::new(config) };
         let fusion = match execution {
             Execution::Inline => FusionOwner::Inline(Box::new(fusion)),
-            Execution::Threaded => {
-                FusionOwner::Threaded(Worker::spawn("dense map", WAITING, |_| move |request| fusion.handle(request))?)
-            }
+            Execution::Threaded => FusionOwner::Threaded(Worker::spawn("dense map", QUEUE_LENGTH, |_| {
+                move |request| fusion.handle(request)
+            })?),
         };
         Ok(Self {
             config: config.clone(),
@@ -120,14 +120,14 @@ impl DenseMapper {
     /// # Errors
     /// If the patches have other cells or belong to another map.
     pub(crate) fn with_earlier(mut self, earlier: DenseMap, map: &Map) -> Result<Self, DenseError> {
-        let DenseMap { grid, mut patches, apart, class_names } = earlier;
+        let DenseMap { grid, mut patches, unmerged, class_names } = earlier;
         if grid != self.grid {
             let (found, wanted) = (grid.stride_px(), self.grid.stride_px());
             let (width, height) = (grid.camera().width, grid.camera().height);
             return Err(DenseError::Cells { found, wanted, width, height });
         }
-        for (at, one) in apart {
-            patches.insert(at.min(patches.len()), one);
+        for (at, placed) in unmerged {
+            patches.insert(at.min(patches.len()), placed);
         }
         let keyframes: BTreeMap<u64, (KeyFrameId, Pose)> =
             map.keyframes().map(|(id, k)| (k.sequence, (id, k.t_cam_world))).collect();
@@ -140,11 +140,12 @@ impl DenseMapper {
         }
         self.class_names = class_names;
         let poses = self.world_poses(map);
-        self.fusion.place(known, poses);
+        self.fusion.integrate(known, poses);
         Ok(self)
     }
 
-    /// Returns whether a keyframe shows enough beyond the last patch to become one.
+    /// Returns whether a keyframe becomes a patch: the camera has moved or turned far enough since the last one, or enough time has
+    /// passed.
     pub(crate) fn is_due(&self, timestamp_ns: i64, t_world_cam: &Pose) -> bool {
         let Some((last_ns, last)) = &self.last else { return true };
         let moved = last.inverse() * t_world_cam;
@@ -165,8 +166,8 @@ impl DenseMapper {
         patch.with_classes(&self.grid, id)
     }
 
-    /// Assigns numbers in the patches to the classes of a detector, by name: the same as in patches of an earlier session. Of more than
-    /// 255 in all, the last are unknown (0).
+    /// Assigns numbers in the patches to the classes of a detector, by name: the same numbers as in patches of an earlier session.
+    /// Of more than 255 classes in all, the last ones are unknown (0).
     pub(crate) fn name_classes(&mut self, names: &[String]) {
         if !self.config.classes {
             return;
@@ -182,13 +183,13 @@ impl DenseMapper {
         self.class_ids = Some(names.iter().map(class).collect());
     }
 
-    /// Inserts a patch with its pose relative to a keyframe, and moves all patches to where the map has them now.
+    /// Inserts a patch with its pose relative to a keyframe, and moves all patches to their present poses in the map.
     pub(crate) fn insert(&mut self, timestamp_ns: i64, pose: KeyframeRelativePose, patch: KeyframePatch, map: &Map) {
         self.poses.push(pose);
         let poses = self.world_poses(map);
         let pose = poses.last().copied().flatten();
         let bytes = patch.bytes();
-        if !self.fusion.place(vec![(timestamp_ns, Arc::new(patch))], poses) {
+        if !self.fusion.integrate(vec![(timestamp_ns, Arc::new(patch))], poses) {
             self.poses.pop();
             self.patches_skipped += 1;
             return;
@@ -199,12 +200,12 @@ impl DenseMapper {
         }
     }
 
-    /// Patches that came while the thread was busy, and were left out.
+    /// Returns the number of patches that were left out because the thread was busy.
     pub(crate) fn patches_skipped(&self) -> usize {
         self.patches_skipped
     }
 
-    /// Number of patches.
+    /// Returns the number of patches.
     pub(crate) fn len(&self) -> usize {
         self.poses.len()
     }
@@ -214,30 +215,30 @@ impl DenseMapper {
         self.bytes
     }
 
-    /// Poses of the patches in the map as it is now, world from camera, each with the root of its submap, which defines the world; `None`
-    /// for patches of a submap that was removed.
+    /// Returns the present poses of the patches, camera to world, each with the root of its submap, which defines the world; `None`
+    /// for patches whose submap was removed.
     fn rooted_poses(&self, map: &Map) -> Vec<Option<(KeyFrameId, Pose)>> {
-        let place = |(keyframe, t_cam_reference): &KeyframeRelativePose| {
+        let rooted = |(keyframe, t_cam_reference): &KeyframeRelativePose| {
             let (root, t_reference_world) = (map.root(*keyframe)?, map.keyframe_pose(*keyframe)?);
             Some((root, (t_cam_reference * t_reference_world).inverse()))
         };
-        self.poses.iter().map(place).collect()
+        self.poses.iter().map(rooted).collect()
     }
 
-    /// Poses of the patches of the submap that has most of them, world from camera; `None` for the others.
+    /// Returns the poses, camera to world, of the patches in the submap that has most of them; `None` for the others.
     fn world_poses(&self, map: &Map) -> Vec<Option<Pose>> {
         let poses = self.rooted_poses(map);
         let largest = largest(&poses);
         poses.into_iter().map(|pose| pose.filter(|(root, _)| Some(*root) == largest).map(|(_, pose)| pose)).collect()
     }
 
-    /// Returns the volume with the patches where the map has them now; waits for the thread, if there is one.
+    /// Returns the volume with the patches at their present poses; waits for the thread, if there is one.
     pub(crate) fn volume(&mut self, map: &Map) -> Volume {
         let poses = self.world_poses(map);
         self.fusion.volume(poses).unwrap_or_else(|| Volume::new(&self.config))
     }
 
-    /// Removes all patches: the map was begun anew.
+    /// Removes all patches, because the map was reset.
     pub(crate) fn clear(&mut self) {
         self.poses.clear();
         self.last = None;
@@ -250,23 +251,23 @@ impl DenseMapper {
         let poses = self.rooted_poses(map);
         let largest = largest(&poses);
         let (grid, class_names) = (self.grid.clone(), self.class_names.clone());
-        let mut dense_map = DenseMap { patches: Vec::new(), apart: Vec::new(), grid, class_names };
-        for (((keyframe, _), place), (timestamp_ns, patch)) in self.poses.iter().zip(poses).zip(self.fusion.patches()) {
+        let mut dense_map = DenseMap { patches: Vec::new(), unmerged: Vec::new(), grid, class_names };
+        for (((keyframe, _), pose), (timestamp_ns, patch)) in self.poses.iter().zip(poses).zip(self.fusion.patches()) {
             let surviving = map.surviving_ancestor(*keyframe);
-            let Some(((root, t_world_cam), (keyframe, _))) = place.zip(surviving) else { continue };
+            let Some(((root, t_world_cam), (keyframe, _))) = pose.zip(surviving) else { continue };
             let patch = Arc::unwrap_or_clone(patch);
-            let one = PlacedPatch { timestamp_ns, keyframe: keyframe.sequence, t_world_cam, patch };
+            let placed = PlacedPatch { timestamp_ns, keyframe: keyframe.sequence, t_world_cam, patch };
             if Some(root) == largest {
-                dense_map.patches.push(one);
+                dense_map.patches.push(placed);
             } else {
-                dense_map.apart.push((dense_map.patches.len() + dense_map.apart.len(), one));
+                dense_map.unmerged.push((dense_map.patches.len() + dense_map.unmerged.len(), placed));
             }
         }
         dense_map
     }
 }
 
-/// The root of the submap that most patches are in; of equals the one begun first.
+/// Returns the root of the submap with most patches; of equals the one that comes first.
 fn largest(poses: &[Option<(KeyFrameId, Pose)>]) -> Option<KeyFrameId> {
     let mut counts: Vec<(usize, KeyFrameId)> = Vec::new();
     for (root, _) in poses.iter().flatten() {
@@ -279,25 +280,25 @@ fn largest(poses: &[Option<(KeyFrameId, Pose)>]) -> Option<KeyFrameId> {
 }
 
 impl FusionOwner {
-    /// Returns whether the patches were taken.
-    fn place(&mut self, patches: Vec<TimedPatch>, poses: Vec<Option<Pose>>) -> bool {
+    /// Integrates patches and moves all to `poses`. Returns whether the patches were accepted.
+    fn integrate(&mut self, patches: Vec<TimedPatch>, poses: Vec<Option<Pose>>) -> bool {
         match self {
             Self::Inline(fusion) => {
-                fusion.place(patches, &poses);
+                fusion.integrate(patches, &poses);
                 true
             }
-            Self::Threaded(worker) => worker.try_send(Request::Place(patches, poses)).is_ok(),
+            Self::Threaded(worker) => worker.try_send(Request::Integrate(patches, poses)).is_ok(),
         }
     }
 
     fn volume(&mut self, poses: Vec<Option<Pose>>) -> Option<Volume> {
         match self {
             Self::Inline(fusion) => {
-                fusion.place(Vec::new(), &poses);
-                Some(fusion.settled_volume())
+                fusion.integrate(Vec::new(), &poses);
+                Some(fusion.updated_volume())
             }
             Self::Threaded(worker) => {
-                let sent = worker.send(Request::Place(Vec::new(), poses)) && worker.send(Request::Volume);
+                let sent = worker.send(Request::Integrate(Vec::new(), poses)) && worker.send(Request::Volume);
                 match sent.then(|| worker.wait())?? {
                     Answer::Volume(volume) => Some(*volume),
                     Answer::Patches(_) => None,
@@ -330,8 +331,8 @@ impl FusionOwner {
 impl Fusion {
     fn handle(&mut self, request: Request) -> Option<Answer> {
         match request {
-            Request::Place(patches, poses) => self.place(patches, &poses),
-            Request::Volume => return Some(Answer::Volume(Box::new(self.settled_volume()))),
+            Request::Integrate(patches, poses) => self.integrate(patches, &poses),
+            Request::Volume => return Some(Answer::Volume(Box::new(self.updated_volume()))),
             Request::Patches => return Some(Answer::Patches(self.patches.clone())),
             Request::Clear => self.clear(),
         }
@@ -339,16 +340,16 @@ impl Fusion {
     }
 
     /// Adds patches, and moves all patches to their poses.
-    fn place(&mut self, patches: Vec<TimedPatch>, poses: &[Option<Pose>]) {
+    fn integrate(&mut self, patches: Vec<TimedPatch>, poses: &[Option<Pose>]) {
         self.patches.extend(patches);
         for (number, ((_, patch), pose)) in self.patches.iter().zip(poses).enumerate() {
             let pose = pose.map(|t_world_cam| self.up * t_world_cam);
-            self.volume.place(number, &self.grid, patch, pose.as_ref());
+            self.volume.integrate(number, &self.grid, patch, pose.as_ref());
         }
     }
 
-    fn settled_volume(&mut self) -> Volume {
-        self.volume.settle();
+    fn updated_volume(&mut self) -> Volume {
+        self.volume.update();
         self.volume.clone()
     }
 
@@ -364,7 +365,7 @@ mod tests {
     use crate::dense::scene;
     use crate::features::FrameFeatures;
 
-    /// A map of three keyframes, 0.3 m apart, and one that stands alone.
+    /// Returns a map of separate keyframes, 0.3 m apart, with a relative pose to each.
     fn map() -> (Map, Vec<KeyframeRelativePose>) {
         let mut map = Map::default();
         let relative_pose = |k: i64| {
@@ -380,16 +381,16 @@ mod tests {
     }
 
     #[test]
-    fn on_its_own_thread_it_makes_the_same_map() {
+    fn on_its_own_thread_the_map_is_the_same() {
         let (map, relative_poses) = map();
         let mut volumes = Vec::new();
         for execution in [Execution::Inline, Execution::Threaded] {
             let mut mapper = mapper(execution);
             let patch = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, Some(1.1));
-            // One submap of one keyframe: the others have no parent either, so that the first is the largest.
+            // The submaps have one keyframe each, because no keyframe has a parent: the one with all patches is the largest.
             for k in 0..3 {
                 mapper.insert(k, relative_poses[0], patch.clone(), &map);
-                // Nothing is passed over when the thread has time.
+                // No patch is left out when the thread has time.
                 volumes.push(mapper.volume(&map));
             }
             assert_eq!((mapper.len(), mapper.patches_skipped()), (3, 0));
@@ -403,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn a_keyframe_that_shows_the_same_as_the_last_piece_is_not_due() {
+    fn a_keyframe_with_the_view_of_the_last_patch_is_not_due() {
         let (map, relative_poses) = map();
         let mut mapper = mapper(Execution::Inline);
         let at = |x: f64, turn: f64| Pose::new(nalgebra::Vector3::new(x, -0.01, 0.0), nalgebra::Vector3::y() * turn);
@@ -416,7 +417,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_of_another_submap_are_left_out_until_it_is_joined() {
+    fn patches_of_another_submap_are_left_out_until_it_is_merged() {
         let (map, relative_poses) = map();
         let mut mapper = mapper(Execution::Inline);
         let patch = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None);
@@ -424,15 +425,15 @@ mod tests {
             mapper.insert(k as i64, relative_pose, patch.clone(), &map);
         }
         let dense_map = mapper.snapshot(&map);
-        assert_eq!(dense_map.patches.iter().map(|one| one.timestamp_ns).collect::<Vec<_>>(), [1, 2]);
-        // It hangs where its keyframe is, seen from where it was.
+        assert_eq!(dense_map.patches.iter().map(|placed| placed.timestamp_ns).collect::<Vec<_>>(), [1, 2]);
+        // Its pose is that of its keyframe combined with the relative pose.
         let t = dense_map.patches[0].t_world_cam.translation.vector;
         assert!((t - nalgebra::Vector3::new(0.3, -0.01, 0.0)).norm() < 1e-9, "{t}");
-        assert_eq!(dense_map.apart.iter().map(|(at, one)| (*at, one.keyframe)).collect::<Vec<_>>(), [(0, 0)]);
+        assert_eq!(dense_map.unmerged.iter().map(|(at, placed)| (*at, placed.keyframe)).collect::<Vec<_>>(), [(0, 0)]);
     }
 
     #[test]
-    fn pieces_of_an_earlier_session_follow_its_map_in_the_next_one() {
+    fn patches_of_an_earlier_session_follow_the_corrections_of_the_next_one() {
         let (mut map, relative_poses) = map();
         let patch = scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None);
         for execution in [Execution::Inline, Execution::Threaded] {
@@ -446,19 +447,19 @@ mod tests {
                 first.volume(&map);
             }
             let dense_map = first.snapshot(&map);
-            assert_eq!((dense_map.patches.len(), dense_map.apart.len()), (3, 2));
-            // Two more of the other submap make it the larger one.
+            assert_eq!((dense_map.patches.len(), dense_map.unmerged.len()), (3, 2));
+            // Two more patches of the other submap make it the larger one.
             let mut second = mapper(execution).with_earlier(dense_map.clone(), &map).unwrap();
             second.insert(10, relative_poses[0], patch.clone(), &map);
             second.volume(&map);
             second.insert(11, relative_poses[0], patch.clone(), &map);
             let after = second.snapshot(&map);
-            assert_eq!(after.patches.iter().map(|one| one.timestamp_ns).collect::<Vec<_>>(), [0, 2, 10, 11]);
+            assert_eq!(after.patches.iter().map(|placed| placed.timestamp_ns).collect::<Vec<_>>(), [0, 2, 10, 11]);
             assert_eq!(
-                after.apart.iter().map(|(at, one)| (*at, one.timestamp_ns)).collect::<Vec<_>>(),
+                after.unmerged.iter().map(|(at, placed)| (*at, placed.timestamp_ns)).collect::<Vec<_>>(),
                 [(1, 1), (3, 3), (4, 4)]
             );
-            // A correction moves what was loaded.
+            // A correction of the map moves the loaded patches.
             let (mut moved, by) = (mapper(execution).with_earlier(dense_map.clone(), &map).unwrap(), 0.5);
             let pose = map.keyframe(relative_poses[1].0).unwrap().t_cam_world;
             map.set_pose(relative_poses[1].0, pose * Pose::translation(0.0, -by, 0.0));
@@ -488,16 +489,16 @@ mod tests {
     }
 
     #[test]
-    fn pieces_of_other_cells_or_of_another_map_are_refused() {
+    fn patches_with_other_cells_or_of_another_map_are_refused() {
         let (map, relative_poses) = map();
         let mut first = mapper(Execution::Inline);
         first.insert(0, relative_poses[2], scene::wall(&CellGrid::new(&scene::camera(), 2), 2.0, None), &map);
         let dense_map = first.snapshot(&map);
         let error = mapper(Execution::Inline).with_earlier(dense_map.clone(), &Map::default()).err().unwrap();
         assert!(error.to_string().contains("keyframe 2"), "{error}");
-        let coarse = DenseConfig { stride_px: 4, ..Default::default() };
-        let coarse = DenseMapper::new(&coarse, &scene::camera(), Execution::Inline).unwrap();
-        let error = coarse.with_earlier(dense_map, &map).err().unwrap().to_string();
+        let other = DenseConfig { stride_px: 4, ..Default::default() };
+        let other = DenseMapper::new(&other, &scene::camera(), Execution::Inline).unwrap();
+        let error = other.with_earlier(dense_map, &map).err().unwrap().to_string();
         assert!(error.contains("cells of 2 px") && error.contains("dense.stride_px = 2"), "{error}");
     }
 }

@@ -1,15 +1,19 @@
-//! Maps that people use: occupancy, clouds, grids, meshes, and the view without people.
+//! The dense map: occupied, free and unknown space with colour and class, and the products made of it: cloud, grid, mesh, images
+//! without people.
 //!
 //! ```text
-//! frame ─► patch ──hangs on its keyframe──► mapper ─► volume      occupied, free, unknown; follows every correction
-//!          depth and colour without          │
-//!          edges; what moves is marked       └──► dense_map ─► cloud, grid, mesh, classes, background
+//! keyframe ─► keyframe_patch ─► mapper ─► volume     occupied, free, unknown; follows every correction of the map
+//!             depth and colour       │
+//!             without edges; what    └────► DenseMap ─► cloud, grid, mesh, classes, background
+//!             moves is marked
 //! ```
 //!
-//! Nothing that moves makes a surface: the dynamic filter's decision is cut into the patch. What it missed is taken back by the views
-//! that come after and see through it.
+//! In: keyframes with colour and depth, the pixels that move, and the poses that the map gives. Out: the dense map and its
+//! products. What moves makes no surface: the dynamic filter's mask is part of each patch. A moving object that the filter missed
+//! disappears when later patches show free space there.
 
 mod background;
+mod block_state;
 mod classes;
 mod cloud;
 mod gravity;
@@ -48,31 +52,33 @@ use crate::config::ConfigError;
 use crate::geometry::Pose;
 use crate::map::persist::MapError;
 
-/// Why no dense map can be made.
+/// The reasons why a dense map or a product cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum DenseError {
-    /// A value of the configuration with which nothing can work.
+    /// A value of the configuration is out of range.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// Pieces of an earlier session on other cells.
+    /// The patches of an earlier session have other cells.
     #[error(
-        "its patches have cells of {found} px of a camera of {width} × {height}, this session has cells of {wanted} px: take the same camera, \
-         and dense.stride_px = {found}"
+        "the saved dense map has patches with cells of {found} px of a camera of {width} × {height}, this session has cells of {wanted} px: \
+         use the same camera and dense.stride_px = {found}"
     )]
     Cells {
-        /// Pixels along each side of their cells.
+        /// Pixels along each side of the saved cells.
         found: usize,
-        /// The same of this session.
+        /// Pixels along each side of this session's cells.
         wanted: usize,
-        /// Their camera's width, px.
+        /// Image width of the saved camera, px.
         width: usize,
-        /// Their camera's height, px.
+        /// Image height of the saved camera, px.
         height: usize,
     },
-    /// Pieces of another map.
-    #[error("a patch hangs on keyframe {0}, which the map does not have: the patches are of another map")]
+    /// The patches belong to another map.
+    #[error(
+        "a patch belongs to keyframe {0}, which the map does not have: the patches are of another map; load them together with their map"
+    )]
     Keyframe(u64),
-    /// More memory than is allowed.
+    /// It would take more memory than the configuration allows.
     #[error(
         "at {resolution_m} m {what} would take about {needed_mb} MB, more than the {allowed_mb} MB that dense.max_memory_mb allows: choose \
          a resolution of {fits_m} m or coarser (dense.resolution_m), a shorter dense.max_range_m, or allow more"
@@ -80,47 +86,47 @@ pub enum DenseError {
     Memory {
         /// Side of a voxel, m.
         resolution_m: f32,
-        /// What takes it.
+        /// The product that takes the memory.
         what: &'static str,
-        /// How much, MB.
+        /// Memory needed, MB.
         needed_mb: usize,
-        /// How much is allowed, MB.
+        /// Memory allowed, MB.
         allowed_mb: usize,
-        /// Side of a voxel with which it is less, m.
+        /// Side of a voxel with which it needs no more than that, m.
         fits_m: f32,
     },
     /// The system was built without a dense map.
     #[error("the system was built without a dense map: give the builder a dense configuration (`SlamBuilder::dense`)")]
     Disabled,
-    /// A thread could not be started.
-    #[error("the thread of the dense map could not be started: {0}; raise the limit of threads of this user")]
+    /// The thread of the dense map could not be started.
+    #[error("the thread of the dense map could not be started: {0}; raise the user's limit of threads")]
     Thread(#[from] std::io::Error),
 }
 
-/// Pieces in their places: what all products are made of.
+/// The dense map as keyframe patches with their poses, from which all products are made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DenseMap {
     /// The cells of the patches.
     pub grid: CellGrid,
-    /// In the order in which they were cut.
+    /// Patches of the submap that has most of them, in the order in which they were extracted.
     pub patches: Vec<PlacedPatch>,
-    /// Those of submaps that are not joined with that of most patches, each in its own world, with its place among all patches. No product
-    /// shows them; they come in when their submap is joined in a later session.
-    pub apart: Vec<(usize, PlacedPatch)>,
-    /// Names of the classes that cells may have, from class 1 on; none if no detector looked for static_objects.
+    /// Patches of other submaps, each with its index among all patches and its pose in its own world. Products leave them out; they
+    /// are included once their submap is merged in a later session.
+    pub unmerged: Vec<(usize, PlacedPatch)>,
+    /// Names of the classes of cells, from class 1 on; empty if no detector searched for static objects.
     pub class_names: Vec<String>,
 }
 
-/// A patch in its place.
+/// A keyframe patch with its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedPatch {
     /// Time of the frame, ns.
     pub timestamp_ns: i64,
-    /// Sequence number of the keyframe it hangs on.
+    /// Sequence number of its keyframe.
     pub keyframe: u64,
-    /// World from camera.
+    /// Pose of the camera, camera to world, m.
     pub t_world_cam: Pose,
-    /// Depth and colour.
+    /// Depth, colour and class.
     pub patch: KeyframePatch,
 }
 
@@ -128,20 +134,21 @@ impl DenseMap {
     /// Returns the map as bytes, for [`DenseMap::from_bytes`].
     ///
     /// # Errors
-    /// If it cannot be written, which would be a fault of this program.
+    /// If it cannot be encoded, which would be a fault of this program.
     pub fn to_bytes(&self) -> Result<Vec<u8>, MapError> {
         persist::encode(self)
     }
 
-    /// Reads the dense map in `bytes` and checks it: a file of its own, or the first part of a saved map.
+    /// Reads and checks the dense map in `bytes`: a file of its own, or the first part of a saved map.
     ///
     /// # Errors
-    /// If the bytes are no dense map, of another version, cut, altered, or contradict themselves; if they are a map without a dense one.
+    /// If the bytes are not a dense map, are of another version, truncated, altered or inconsistent, or are a map without a dense
+    /// map.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, MapError> {
         persist::decode(bytes)
     }
 
-    /// A dense_map of patches whose places, world from camera, no map has to say; numbered in the order given.
+    /// Returns a dense map of patches with given poses, camera to world; numbered in their order.
     #[cfg(test)]
     pub(crate) fn of_poses(grid: CellGrid, patches: impl IntoIterator<Item = (Pose, KeyframePatch)>) -> Self {
         let number = |(number, (t_world_cam, patch))| PlacedPatch {
@@ -152,7 +159,7 @@ impl DenseMap {
         };
         Self {
             patches: patches.into_iter().enumerate().map(number).collect(),
-            apart: Vec::new(),
+            unmerged: Vec::new(),
             grid,
             class_names: Vec::new(),
         }
@@ -163,21 +170,21 @@ impl DenseMap {
         gravity::turn(self, up)
     }
 
-    /// Returns the height of the floor in a world turned by `turn`, m; `None` where no floor was measured.
+    /// Returns the height of the floor in a world turned by `turn`, m; `None` if no floor was measured.
     pub fn floor_m(&self, turn: &UnitQuaternion<f64>) -> Option<f64> {
         gravity::floor_m(self, turn)
     }
 
-    /// Bytes of memory that its patches take.
+    /// Returns the memory that its patches take, bytes.
     pub fn bytes(&self) -> usize {
-        self.patches.iter().map(|one| one.patch.bytes()).sum()
+        self.patches.iter().map(|placed| placed.patch.bytes()).sum()
     }
 
     /// Returns the volume of all patches in a world turned by `turn`, within the memory that the configuration allows. `progress`
-    /// receives the number of patches that are done.
+    /// receives the number of finished patches.
     ///
     /// # Errors
-    /// Where it would take more memory.
+    /// If it would take more memory.
     pub fn volume(
         &self,
         config: &DenseConfig,
@@ -189,7 +196,7 @@ impl DenseMap {
             progress(number);
             let bytes = volume.bytes();
             if check_memory(config, "the map", bytes).is_err() {
-                // As much again for each patch that is still to come.
+                // The remaining patches are assumed to take as much on average.
                 refused = check_memory(config, "the map", bytes / number.max(1) * self.patches.len()).err();
             }
             refused.is_none()
@@ -197,27 +204,27 @@ impl DenseMap {
         refused.map_or(Ok(volume), Err)
     }
 
-    /// Enters patches for as long as `goes_on`, which is asked before each, says so.
+    /// Integrates the patches for as long as `go_on`, which is called before each and at the end, returns true.
     fn fill(
         &self,
         config: &DenseConfig,
         turn: &UnitQuaternion<f64>,
-        mut goes_on: impl FnMut(usize, &Volume) -> bool,
+        mut go_on: impl FnMut(usize, &Volume) -> bool,
     ) -> Volume {
         let mut volume = Volume::new(config);
-        for (number, one) in self.patches.iter().enumerate() {
-            if !goes_on(number, &volume) {
+        for (number, placed) in self.patches.iter().enumerate() {
+            if !go_on(number, &volume) {
                 return volume;
             }
-            volume.place(number, &self.grid, &one.patch, Some(&(turn * one.t_world_cam)));
+            volume.integrate(number, &self.grid, &placed.patch, Some(&(turn * placed.t_world_cam)));
         }
-        goes_on(self.patches.len(), &volume);
-        volume.settle();
+        go_on(self.patches.len(), &volume);
+        volume.update();
         volume
     }
 }
 
-/// Whether `what` may take so many bytes.
+/// Checks whether `what` may take so many bytes.
 ///
 /// # Errors
 /// If the configuration allows less.
@@ -226,16 +233,17 @@ pub(crate) fn check_memory(config: &DenseConfig, what: &'static str, bytes: usiz
     if needed_mb <= allowed_mb {
         return Ok(());
     }
-    // Surfaces grow with the square of the resolution, space with its cube: the square is the safe side. In steps of 5 mm.
+    // Surfaces grow with the square of the resolution, space with its cube: the square is the safe side. The result is rounded up
+    // to 5 mm.
     let finer = (needed_mb as f32 / allowed_mb as f32).sqrt();
     let fits_m = ((config.resolution_m * finer * 200.0).ceil() / 200.0).min(0.2);
     Err(DenseError::Memory { resolution_m: config.resolution_m, what, needed_mb, allowed_mb, fits_m })
 }
 
-/// Checks whether the cloud and the mesh of a volume may be made.
+/// Checks whether the cloud and the mesh of a volume fit into the allowed memory.
 ///
 /// # Errors
-/// If one of those wanted would take more memory than the configuration of the volume allows.
+/// If one of the requested products would take more memory than the configuration of the volume allows.
 pub fn check_products(volume: &Volume, wants_cloud: bool, wants_mesh: bool) -> Result<(), DenseError> {
     if wants_cloud {
         check_memory(volume.config(), "the cloud", cloud::bytes(volume))?;
@@ -251,7 +259,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_map_that_would_take_too_much_memory_is_refused_and_the_resolution_that_is_advised_fits() {
+    fn a_map_that_needs_too_much_memory_is_refused_and_the_advised_resolution_fits() {
         let mut config = DenseConfig { resolution_m: 0.01, max_memory_mb: 2, ..Default::default() };
         let grid = CellGrid::new(&scene::camera(), config.stride_px);
         let pose = |k: u32| Pose::translation(0.0, 0.0, f64::from(k) * 0.4);

@@ -1,8 +1,8 @@
-//! What stands in a frame: the body in each box, for maps that know classes.
+//! Segmentation of static objects, for dense maps with classes.
 //!
-//! In: boxes of static_objects that cannot move, the depth image, and what moves in it. Out: the class at each position. Bodies are found as those
-//! of people are, by the depth group in the box (YF-SLAM, section 3.3), in what whoever walks before them leaves of it; but no surface is
-//! followed out of the box: chairs stand on floors, and screens before walls.
+//! In: detections of objects that cannot move, the depth image, and what moves in it. Out: the class of the object at each
+//! position. Objects are segmented like people, by the depth group in the box (YF-SLAM, section 3.3), among the cells that people
+//! in front of them leave; but no surface is followed out of the box, because chairs stand on floors and screens in front of walls.
 
 use crate::config::DynamicConfig;
 use crate::detect::Detection;
@@ -11,15 +11,15 @@ use crate::dynamic::segment::depth_clusters::DepthClusters;
 use crate::dynamic::segment::mask::InstanceMask;
 use crate::image::DepthImage;
 
-/// Segmenter of static_objects, and the class of each.
+/// The mask of the static objects of a frame, and the class of each.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ObjectMasks {
-    bodies: InstanceMask,
+    instances: InstanceMask,
     classes: Vec<usize>,
 }
 
 impl ObjectMasks {
-    /// Segmenter the static_objects in boxes of at least `config.open_score`.
+    /// Segments the objects of detections with a score of at least `config.open_score`.
     pub(super) fn segment(
         config: &DynamicConfig,
         boxes: &[Detection],
@@ -27,23 +27,23 @@ impl ObjectMasks {
         moving: &MovingMask,
     ) -> Self {
         let mut certain: Vec<Detection> = boxes.iter().filter(|one| one.score >= config.open_score).copied().collect();
-        // What stands on a table is in the table's box too, and comes before it.
+        // An object on a table is in the table's box too: the smaller box comes first.
         certain.sort_by(|a, b| a.bbox.area().total_cmp(&b.bbox.area()));
-        let within = DynamicConfig { margin: 0.0, reach_m: 0.0, ..config.clone() };
-        let (mut groups, mut bodies) = (DepthClusters::new(config.seed), InstanceMask::default());
-        bodies.begin(depth);
-        bodies.mark_where(|x, y| moving.covers(depth, [x as f32, y as f32], 0.0));
+        let without_margin = DynamicConfig { margin: 0.0, reach_m: 0.0, ..config.clone() };
+        let (mut clusters, mut instances) = (DepthClusters::new(config.seed), InstanceMask::default());
+        instances.begin_frame(depth);
+        instances.mark_where(|x, y| moving.covers(depth, [x as f32, y as f32], 0.0));
         for (number, one) in certain.iter().enumerate() {
-            if let Some(center_m) = groups.thing_in(config, &one.bbox, &bodies) {
-                bodies.grow(&within, number, &one.bbox, center_m);
+            if let Some(center_m) = clusters.unlabelled_object_depth(config, &one.bbox, &instances) {
+                instances.segment(&without_margin, number, &one.bbox, center_m);
             }
         }
-        Self { bodies, classes: certain.iter().map(|one| one.class).collect() }
+        Self { instances, classes: certain.iter().map(|one| one.class).collect() }
     }
 
-    /// The class, as [`Detection::class`], of the thing at a position of the raw image, px.
+    /// Returns the class, as [`Detection::class`], of the object at a position, px of the raw image.
     pub(super) fn class_at(&self, raw: [f32; 2]) -> Option<usize> {
-        self.classes.get(self.bodies.body_at(raw)?).copied()
+        self.classes.get(self.instances.instance_at(raw)?).copied()
     }
 }
 
@@ -54,31 +54,34 @@ mod tests {
     use crate::dynamic::Region;
     use crate::image::Image;
 
-    fn found(class: usize, score: f32, [x_min, y_min, x_max, y_max]: [f32; 4]) -> Detection {
+    fn detection(class: usize, score: f32, [x_min, y_min, x_max, y_max]: [f32; 4]) -> Detection {
         Detection { class, score, bbox: BoundingBox { x_min, y_min, x_max, y_max } }
     }
 
     #[test]
-    fn in_a_box_the_thing_has_its_class_and_what_is_behind_or_walks_before_it_has_none() {
+    fn an_object_has_its_class_and_the_background_and_a_person_in_front_have_none() {
         let mut raw = Image::new(320, 240);
         raw.data_mut().fill(15_000u16);
-        // A chair 1.5 m away with a cup on it, somebody at 1 m before both, in a world that ends 3 m away.
+        // A chair 1.5 m away with a cup on it, a person at 1 m in front of both, a wall at 3 m.
         (80..200).for_each(|y| raw.row_mut(y)[100..160].fill(7_500));
         (80..110).for_each(|y| raw.row_mut(y)[110..130].fill(7_000));
         (60..210).for_each(|y| raw.row_mut(y)[140..170].fill(5_000));
         let depth = DepthImage { raw, metres_per_unit: 1.0 / 5000.0 };
         let boxes = [
-            found(56, 0.9, [90.0, 60.0, 180.0, 210.0]),
-            found(41, 0.5, [108.0, 76.0, 132.0, 112.0]),
-            found(7, 0.1, [200.0, 60.0, 300.0, 210.0]),
+            detection(56, 0.9, [90.0, 60.0, 180.0, 210.0]),
+            detection(41, 0.5, [108.0, 76.0, 132.0, 112.0]),
+            detection(7, 0.1, [200.0, 60.0, 300.0, 210.0]),
         ];
-        let bbox = found(0, 0.9, [140.0, 60.0, 170.0, 210.0]).bbox;
+        let bbox = detection(0, 0.9, [140.0, 60.0, 170.0, 210.0]).bbox;
         let walker = Region { bbox, score: 0.9, misses: 0, depth_m: Some([0.8, 1.2]) };
         let moving = MovingMask::from_regions(vec![walker]);
-        let static_objects = ObjectMasks::segment(&DynamicConfig::default(), &boxes, &depth, &moving);
-        let at = |x: f32, y: f32| static_objects.class_at([x, y]);
-        assert_eq!((at(120.0, 150.0), at(120.0, 95.0)), (Some(56), Some(41)));
-        assert_eq!((at(150.0, 150.0), at(175.0, 70.0), at(20.0, 20.0), at(250.0, 100.0)), (None, None, None, None));
-        assert_eq!((at(319.5, 10.0), at(5000.0, 10.0), at(10.0, 5000.0)), (None, None, None));
+        let masks = ObjectMasks::segment(&DynamicConfig::default(), &boxes, &depth, &moving);
+        let class_at = |x: f32, y: f32| masks.class_at([x, y]);
+        assert_eq!((class_at(120.0, 150.0), class_at(120.0, 95.0)), (Some(56), Some(41)));
+        assert_eq!(
+            (class_at(150.0, 150.0), class_at(175.0, 70.0), class_at(20.0, 20.0), class_at(250.0, 100.0)),
+            (None, None, None, None)
+        );
+        assert_eq!((class_at(319.5, 10.0), class_at(5000.0, 10.0), class_at(10.0, 5000.0)), (None, None, None));
     }
 }

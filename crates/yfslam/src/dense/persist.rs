@@ -1,7 +1,8 @@
-//! Pieces as bytes: what `yfslam run --dense` leaves behind.
+//! The dense map as bytes, as `yfslam run --dense` saves it.
 //!
-//! In: a dense_map. Out: bytes, and back. They are a file of their own, or stand in a saved map before what [`crate::map::persist`] writes,
-//! whose keyframes they name. Depth and colour are kept as differences from the cell to the left, which pack better.
+//! In: a dense map. Out: bytes, and back. The bytes are a file of their own, or the first part of a saved map, before the part of
+//! [`crate::map::persist`], whose keyframes they name. Depth and colour are stored as differences to the cell on the left, which
+//! compress better.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,11 +15,11 @@ use crate::map::persist::{CameraRecord, pose_of, pose_record};
 struct Records {
     camera: CameraRecord,
     stride_px: u32,
-    /// Of those that patches have, from class 1 on.
+    /// Names of the classes of patches, from class 1 on.
     class_names: Vec<String>,
     patches: Vec<PatchRecord>,
-    /// With their place among all patches.
-    apart: Vec<(u32, PatchRecord)>,
+    /// With their index among all patches.
+    unmerged: Vec<(u32, PatchRecord)>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -29,28 +30,28 @@ struct PatchRecord {
     pose: [f64; 7],
     depth: Vec<i16>,
     color: Vec<u8>,
-    /// As it is in the patch: none, or one for each cell.
+    /// As in the patch: empty, or one for each cell.
     class: Vec<u8>,
 }
 
-/// The dense_map as bytes.
+/// Encodes a dense map.
 ///
 /// # Errors
-/// If it cannot be written, which would be a fault of this program.
+/// If it cannot be encoded, which would be a fault of this program.
 pub(super) fn encode(dense_map: &DenseMap) -> Result<Vec<u8>, ContainerError> {
     DENSE_MAP.pack(&Records {
         camera: CameraRecord::of(dense_map.grid.camera()),
         stride_px: dense_map.grid.stride_px() as u32,
         class_names: dense_map.class_names.clone(),
         patches: dense_map.patches.iter().map(PatchRecord::of).collect(),
-        apart: dense_map.apart.iter().map(|(at, one)| (*at as u32, PatchRecord::of(one))).collect(),
+        unmerged: dense_map.unmerged.iter().map(|(at, placed)| (*at as u32, PatchRecord::of(placed))).collect(),
     })
 }
 
-/// The dense_map in `bytes`, checked: a file of its own, or that of a saved map.
+/// Decodes and checks the dense map in `bytes`: a file of its own, or part of a saved map.
 ///
 /// # Errors
-/// If the bytes are no dense_map, of another version, cut, altered, or contradict themselves; if they are a map without one.
+/// If the bytes are not a dense map, are of another version, truncated, altered or inconsistent, or are a map without a dense map.
 pub(super) fn decode(bytes: &[u8]) -> Result<DenseMap, ContainerError> {
     if MAP.begins(bytes) {
         return Err(ContainerError::NoPieces);
@@ -59,32 +60,32 @@ pub(super) fn decode(bytes: &[u8]) -> Result<DenseMap, ContainerError> {
     if !map.is_empty() {
         MAP.whole(map)?;
     }
-    let Records { camera, stride_px, class_names, patches, apart } = packed.unpack()?;
+    let Records { camera, stride_px, class_names, patches, unmerged } = packed.unpack()?;
     let camera = camera.into_camera();
-    let wrong = |what: String| Err(ContainerError::Records(what));
+    let invalid = |what: String| Err(ContainerError::Records(what));
     if stride_px == 0 || stride_px as usize > camera.width.min(camera.height) {
-        return wrong(format!("cells of {stride_px} px in a picture of {} × {}", camera.width, camera.height));
+        return invalid(format!("cells of {stride_px} px in an image of {} × {}", camera.width, camera.height));
     }
-    // A grid is made from these: they must be worth the memory.
+    // The grid is allocated from these numbers: a corrupt file must not exhaust the memory.
     if camera.width.saturating_mul(camera.height) > 1 << 28 {
-        return wrong(format!("a camera of {} × {} px", camera.width, camera.height));
+        return invalid(format!("an image size of {} × {} px is too large", camera.width, camera.height));
     }
     let grid = CellGrid::new(&camera, stride_px as usize);
     let patch = |record: PatchRecord| record.into_patch(&grid, class_names.len());
     let patches = patches.into_iter().map(patch).collect::<Result<_, _>>()?;
-    let apart = apart.into_iter().map(|(at, record)| Ok((at as usize, patch(record)?)));
-    let apart = apart.collect::<Result<_, _>>()?;
-    Ok(DenseMap { patches, apart, grid, class_names })
+    let unmerged = unmerged.into_iter().map(|(at, record)| Ok((at as usize, patch(record)?)));
+    let unmerged = unmerged.collect::<Result<_, _>>()?;
+    Ok(DenseMap { patches, unmerged, grid, class_names })
 }
 
 impl PatchRecord {
-    fn of(one: &PlacedPatch) -> Self {
-        let KeyframePatch { depth, color, class } = &one.patch;
+    fn of(placed: &PlacedPatch) -> Self {
+        let KeyframePatch { depth, color, class } = &placed.patch;
         let (mut last_depth, mut last_color) = (0u16, [0u8; 3]);
         Self {
-            timestamp_ns: one.timestamp_ns,
-            keyframe: one.keyframe,
-            pose: pose_record(&one.t_world_cam),
+            timestamp_ns: placed.timestamp_ns,
+            keyframe: placed.keyframe,
+            pose: pose_record(&placed.t_world_cam),
             depth: depth.iter().map(|&d| d.wrapping_sub(std::mem::replace(&mut last_depth, d)) as i16).collect(),
             color: color
                 .iter()
@@ -108,7 +109,7 @@ impl PatchRecord {
         }
         let unnamed = self.class.iter().find(|class| usize::from(**class) > classes);
         if let Some(class) = unnamed.filter(|_| self.class.len() == cells) {
-            return Err(ContainerError::Records(format!("class {class} has no name: there are {classes}")));
+            return Err(ContainerError::Records(format!("class {class} has no name: there are {classes} names")));
         }
         if self.class.len() != cells && !self.class.is_empty() {
             let (found, keyframe) = (self.class.len(), self.keyframe);
@@ -117,7 +118,7 @@ impl PatchRecord {
         let Some(t_world_cam) = pose_of(&self.pose) else {
             let Self { keyframe, pose, .. } = self;
             return Err(ContainerError::Records(format!(
-                "the pose of the patch of keyframe {keyframe} is none: {pose:?}"
+                "the pose of the patch of keyframe {keyframe} is not valid: {pose:?}"
             )));
         };
         let (mut depth, mut color) = (0u16, [0u8; 3]);
@@ -159,10 +160,10 @@ mod tests {
         patches[2].patch.depth.iter_mut().for_each(|d| *d |= 1 << 15);
         patches[0].patch = patches[0].patch.clone().with_classes(&grid, |[x, _]| u8::from(x < 20.0) * 2);
         let class_names = vec!["chair".to_owned(), "tv".to_owned()];
-        DenseMap { patches, apart: vec![(1, patch(7))], grid, class_names }
+        DenseMap { patches, unmerged: vec![(1, patch(7))], grid, class_names }
     }
 
-    /// A map of one keyframe.
+    /// Returns the bytes of a map of one keyframe.
     fn map() -> Vec<u8> {
         let (scene, mut map) = (Scene::new(), Map::default());
         scene.add(&mut map, 0, &scene.pose(0), &[]);
@@ -170,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_survey_read_back_is_the_one_that_was_written() {
+    fn a_dense_map_read_back_equals_the_one_that_was_written() {
         let dense_map = dense_map();
         let read = decode(&encode(&dense_map).unwrap()).unwrap();
         assert_eq!(read, dense_map);
@@ -185,18 +186,18 @@ mod tests {
     }
 
     #[test]
-    fn a_saved_map_holds_both_what_finds_a_camera_and_what_products_are_made_of() {
+    fn a_saved_map_holds_the_map_and_the_dense_map() {
         let (patches, map) = (encode(&dense_map()).unwrap(), map());
         let both = [patches.clone(), map.clone()].concat();
         assert_eq!(decode(&both).unwrap(), dense_map());
         assert_eq!(crate::map::persist::decode(&both).unwrap().map.keyframe_count(), 1);
         assert_eq!(decode(&map).unwrap_err(), ContainerError::NoPieces);
         let error = crate::map::persist::decode(&patches).unwrap_err();
-        assert_eq!(error, ContainerError::Foreign(MAP.magic), "patches alone find no camera");
+        assert_eq!(error, ContainerError::Foreign(MAP.magic), "a dense map alone has no landmarks");
     }
 
     #[test]
-    fn no_cut_and_no_flipped_bit_goes_unnoticed() {
+    fn truncation_and_flipped_bits_are_detected() {
         let patches = encode(&dense_map()).unwrap();
         let both = [patches.clone(), map()].concat();
         for length in (0..both.len()).step_by(97).filter(|length| *length != patches.len()) {
@@ -214,10 +215,10 @@ mod tests {
     }
 
     #[test]
-    fn pieces_of_an_earlier_version_are_refused_by_its_number() {
+    fn an_earlier_version_is_refused_with_its_number() {
         let mut bytes = encode(&dense_map()).unwrap();
         bytes[DENSE_MAP.magic.len()] = 1;
         let error = decode(&bytes).unwrap_err().to_string();
-        assert!(error.contains("version 1") && error.contains("make it anew"), "{error}");
+        assert!(error.contains("version 1"), "{error}");
     }
 }

@@ -1,4 +1,6 @@
-//! The dense map while the system runs, for the caller.
+//! Access to the dense map while the system runs.
+//!
+//! In: the patches of the mapper and the present map. Out: the volume and the products.
 
 use super::cloud::{CloudPoint, cloud};
 use super::grid::{GroundGrid, ground_grid};
@@ -6,8 +8,9 @@ use super::mesh::{Mesh, mesh};
 use super::{DenseMap, DenseMapper, Volume};
 use crate::map::Map;
 
-/// The dense map as it is now: in the world of the submap that has most keyframe patches, turned so that the z-axis points up in the
-/// first image (ROS, REP 103). With [`Execution::Threaded`](crate::Execution::Threaded) each call waits for the patches handed over.
+/// The present dense map, in the world of the submap that has most keyframe patches, turned so that the z-axis points up in the
+/// first image (ROS, REP 103). With [`Execution::Threaded`](crate::Execution::Threaded) each call waits until all patches are
+/// integrated.
 pub struct DenseView<'a> {
     mapper: &'a mut DenseMapper,
     map: &'a Map,
@@ -38,7 +41,7 @@ impl<'a> DenseView<'a> {
         mesh(&self.snapshot(), &self.volume(), |_, _| {})
     }
 
-    /// Returns the keyframe patches with their poses: what all products are made of, and what is saved.
+    /// Returns the keyframe patches with their poses, which can be saved and from which all products are made.
     pub fn snapshot(&mut self) -> DenseMap {
         self.mapper.snapshot(self.map)
     }

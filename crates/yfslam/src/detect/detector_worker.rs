@@ -1,6 +1,7 @@
-//! The detector on a thread of its own, beside feature extraction.
+//! The detector on its own thread, in parallel with feature extraction.
 //!
-//! In: an image. Out: its detections, joined within the frame, or polled when they may be late. One image is under way at most.
+//! In: an image. Out: its detections, waited for within the frame, or polled when they may arrive later. At most one image is
+//! processed at a time.
 
 use std::sync::Arc;
 
@@ -10,9 +11,10 @@ use crate::worker::Worker;
 
 /// An image, the roll of its camera in degrees, and the buffer for its detections.
 type Request = (Arc<RgbImage>, i32, Vec<Detection>);
+/// The result of the detector, and its output.
 type Answer = (Result<(), DetectorError>, DetectorOutput);
 
-/// What a detector found in one image.
+/// The output of a detector for one image.
 #[derive(Debug, Default)]
 pub(crate) struct DetectorOutput {
     /// The detections, best score first.
@@ -32,7 +34,7 @@ impl DetectorWorker {
     /// Starts the thread.
     ///
     /// # Errors
-    /// If the operating system grants no thread.
+    /// If the operating system cannot start a thread.
     pub(crate) fn spawn(mut detector: Box<dyn Detector>) -> std::io::Result<Self> {
         let mut compensation = RollCompensation::default();
         let detect = move |(image, roll_deg, mut detections): Request| {
@@ -43,16 +45,16 @@ impl DetectorWorker {
         Ok(Self { worker: Worker::spawn("detector", 1, |_| detect)?, output: DetectorOutput::default(), busy: false })
     }
 
-    /// Hands over an image, unless one is under way.
+    /// Starts the detector on an image, unless another one is being processed.
     pub(crate) fn start(&mut self, image: &Arc<RgbImage>, roll_deg: i32) {
         if !self.busy && self.worker.is_alive() {
-            // A thread that has ended is noticed when its answer is awaited.
+            // If the thread has ended, `finish` reports it.
             self.worker.send((Arc::clone(image), roll_deg, std::mem::take(&mut self.output.detections)));
             self.busy = true;
         }
     }
 
-    /// Waits for the detections of the image under way; `None` if there is none.
+    /// Waits for the detections of the image that was started; `None` if there is none.
     pub(crate) fn finish(&mut self) -> Option<Result<&DetectorOutput, DetectorError>> {
         if !self.busy {
             return None;
@@ -61,7 +63,7 @@ impl DetectorWorker {
         Some(self.take(answer))
     }
 
-    /// Returns the detections of the image under way if they are ready.
+    /// Returns the detections of the image that was started if they are ready.
     pub(crate) fn poll(&mut self) -> Option<Result<&DetectorOutput, DetectorError>> {
         if !self.busy {
             return None;
@@ -88,7 +90,7 @@ mod tests {
     use super::*;
     use crate::detect::BoundingBox;
 
-    /// Returns one box as wide as the image; fails at a width of 13 px.
+    /// A detector that returns one box as wide as the image and fails at a width of 13 px.
     struct Widths;
 
     impl Detector for Widths {
@@ -100,12 +102,12 @@ mod tests {
             out.clear();
             let bbox = BoundingBox { x_max: image.width() as f32, ..Default::default() };
             out.push(Detection { class: 0, score: 1.0, bbox });
-            if image.width() == 13 { Err(DetectorError("unlucky width".to_owned())) } else { Ok(()) }
+            if image.width() == 13 { Err(DetectorError("width of 13 px".to_owned())) } else { Ok(()) }
         }
     }
 
     #[test]
-    fn each_answer_belongs_to_its_image_and_an_error_ends_nothing() {
+    fn each_answer_belongs_to_its_image_and_an_error_does_not_end_the_worker() {
         let mut worker = DetectorWorker::spawn(Box::new(Widths)).unwrap();
         for width in 10..16 {
             worker.start(&Arc::new(RgbImage::new(width, 2)), 0);
@@ -113,10 +115,11 @@ mod tests {
                 Ok(output) => assert_eq!(output.detections[0].bbox.x_max, width as f32),
                 Err(_) => assert_eq!(width, 13),
             }
-            assert!(worker.finish().is_none() && worker.poll().is_none(), "each answer is given once");
+            assert!(worker.finish().is_none() && worker.poll().is_none(), "each answer is returned once");
         }
     }
 
+    /// A detector that waits for the test.
     struct Slow(Receiver<()>);
 
     impl Detector for Slow {
@@ -131,14 +134,14 @@ mod tests {
     }
 
     #[test]
-    fn polling_never_waits_and_gives_the_detections_of_the_image_that_was_started() {
-        let (go, gate) = sync_channel(1);
-        let mut worker = DetectorWorker::spawn(Box::new(Slow(gate))).unwrap();
+    fn polling_never_waits_and_returns_the_detections_of_the_image_that_was_started() {
+        let (resume, waiting) = sync_channel(1);
+        let mut worker = DetectorWorker::spawn(Box::new(Slow(waiting))).unwrap();
         for width in 10..13 {
             worker.start(&Arc::new(RgbImage::new(width, 2)), 0);
             assert!(worker.poll().is_none());
         }
-        go.send(()).unwrap();
+        resume.send(()).unwrap();
         let output = loop {
             match worker.poll() {
                 Some(output) => break output.unwrap(),

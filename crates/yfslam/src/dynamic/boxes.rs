@@ -1,16 +1,18 @@
-//! Method `boxes`: whatever is inside a box moves.
+//! Method `boxes`: every feature inside the bounding box of a movable object is excluded.
+//!
+//! In: detections. Out: the trust of each feature.
 
 use crate::config::DynamicConfig;
-use crate::dynamic::region::apply;
+use crate::dynamic::region::apply_regions;
 use crate::dynamic::{DynamicFilter, FilterInput, MovingMask, Region};
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
 
-/// Takes the boxes that are certain enough as they are.
+/// The filter that excludes whole bounding boxes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Boxes {
     regions: Vec<Region>,
-    /// Boxes whose features are needed, though they move.
+    /// Boxes whose features are trusted all the same, because too few others remained.
     given_up: Vec<Region>,
 }
 
@@ -19,7 +21,7 @@ impl DynamicFilter for Boxes {
         self.regions.clear();
         let certain = input.movable.iter().filter(|d| d.score >= config.open_score);
         self.regions.extend(certain.map(|d| Region { bbox: d.bbox, score: d.score, misses: 0, depth_m: None }));
-        apply(config, &mut self.regions, &mut self.given_up, input.depth, features, input.sensor);
+        apply_regions(config, &mut self.regions, &mut self.given_up, input.depth, features, input.sensor);
     }
 
     fn regions(&self) -> &[Region] {

@@ -1,7 +1,8 @@
-//! Which features may be trusted to be static (YF-SLAM, section 3.3).
+//! Dynamic filters: how far each feature is trusted to be static (YF-SLAM, section 3.3).
 //!
-//! In: boxes of movable objects, the depth image, the frame's features. Out: each feature's trust. Nothing else in the core knows that
-//! people exist. One file per method; [`Method::filter`] makes the filter that a name stands for.
+//! In: detections of movable objects, the grey and the depth image, the features of the frame; later its first pose and the map.
+//! Out: the trust of each feature, and the pixels that move. No other module of the core distinguishes people from the scene. Each
+//! method is one file; [`filter_for`] makes the filter of a [`Method`].
 
 mod baselines;
 mod boxes;
@@ -10,6 +11,7 @@ mod full;
 mod none;
 mod region;
 pub(crate) mod segment;
+mod track;
 mod tracks;
 mod yf_slam;
 
@@ -22,31 +24,34 @@ use crate::image::{DepthImage, GrayImage, Image};
 use crate::map::{KeyframeRelativePose, Map};
 pub use region::{MovingMask, Region};
 
-/// What is known about a frame before its pose.
+/// Data of a frame before its pose is known.
 #[non_exhaustive]
 pub struct FilterInput<'a> {
-    /// Detections of movable objects, at any score.
+    /// Detections of movable objects, of any score; boxes in px of the raw image.
     pub movable: &'a [Detection],
-    /// Whether the image was searched for such objects: without a search, a missing box means nothing.
+    /// Whether a detector processed this image. If not, `movable` is empty, which does not mean that the image shows no movable
+    /// object.
     pub detected: bool,
-    /// Pixels of movable objects, where a segmentation is at hand: 0 where there is none.
+    /// Segmentation of the movable objects, if the detector or the caller gives one: 0 where there is none, any other value where
+    /// there is one.
     pub mask: Option<&'a Image<u8>>,
-    /// The grey image.
+    /// The grey image as the camera delivers it, with lens distortion.
     pub gray: &'a GrayImage,
-    /// The depth image; of a stereo camera it is zero but around features with a depth, of a single camera zero everywhere.
+    /// The depth image, registered to the grey image; 0 is "not measured". With a stereo camera only the surroundings of matched
+    /// features have depth, with a single camera no pixel has.
     pub depth: &'a DepthImage,
     /// The camera, and the scales of the pyramid levels.
     pub(crate) sensor: &'a SensorModel,
 }
 
-/// The first pose of a frame, and what it can be compared with.
+/// The first pose of a frame, and the map with which the frame can be compared.
 #[non_exhaustive]
 pub struct FirstPose<'a> {
     /// The camera, and the scales of the pyramid levels.
     pub(crate) sensor: &'a SensorModel,
-    /// The map.
+    /// The map as it was before this frame.
     pub map: &'a Map,
-    /// The pose of the frame.
+    /// The pose of the frame, world to camera, from the features that were trusted so far.
     pub t_cam_world: &'a Pose,
 }
 
@@ -63,51 +68,58 @@ pub(crate) fn filter_for(method: Method, seed: u64) -> Box<dyn DynamicFilter> {
     }
 }
 
-/// Decides for the features of one frame after another how far each is trusted to be static. Buffers are reused: after warm-up no call
-/// allocates.
+/// A dynamic filter: decides for each feature of each frame how far it is trusted to be static.
 ///
-/// Only [`DynamicFilter::before_pose`] is required.
+/// Give it to [`SlamBuilder::filter`](crate::SlamBuilder::filter). For each frame the system calls
+/// [`before_pose`](Self::before_pose), estimates a first pose from the trusted features, calls [`after_pose`](Self::after_pose),
+/// refines the pose if the trust has changed, and calls [`end_frame`](Self::end_frame). A trust of 0 excludes a feature from
+/// tracking and mapping; a value between 0 and 1 is the weight of its residuals. Only [`before_pose`](Self::before_pose) is
+/// required. A filter should reuse its buffers, so that no call allocates memory after the first frames.
 pub trait DynamicFilter: Send + Sync {
-    /// Sets [`Feature::trust`](crate::Feature::trust) of each feature, which is 1 at first, before the pose is known.
+    /// Sets [`Feature::trust`](crate::Feature::trust) of the features before the pose is known. Each is 1 at the call.
     fn before_pose(&mut self, config: &DynamicConfig, input: &FilterInput<'_>, features: &mut FrameFeatures);
 
-    /// Changes the trust of features after a first pose was estimated. Returns whether any feature lost its trust.
+    /// Changes the trust of features after the first pose was estimated from the last frame or the reference keyframe; it is not
+    /// called while the map is initialised or the camera is relocalised. Returns whether something that moves was found: the pose
+    /// is then refined again.
     fn after_pose(&mut self, _config: &DynamicConfig, _first: &FirstPose<'_>, _features: &mut FrameFeatures) -> bool {
         false
     }
 
-    /// Gives features that boxes alone exclude the trust `dynamic.full.doubted_trust`, because the frame cannot be tracked without them.
-    /// Returns whether there are any.
+    /// Gives the trust `dynamic.full.doubted_trust` to features that only a bounding box excludes. Called when too few trusted
+    /// features remain to track the frame; it is then tracked again. Returns whether the trust of any feature has changed.
     fn doubt_boxes(&mut self, _config: &DynamicConfig, _features: &mut FrameFeatures) -> bool {
         false
     }
 
-    /// Ends the doubts about a frame that was tracked: features that boxes exclude have kept some trust if they match landmarks.
+    /// Receives the features after a frame was tracked with the help of [`doubt_boxes`](Self::doubt_boxes): those that a box
+    /// excludes keep a trust above 0 where they match landmarks. A filter can ignore a box whose features match many landmarks.
     fn settle_doubts(&mut self, _config: &DynamicConfig, _features: &FrameFeatures) {}
 
-    /// Receives the pose of the tracked frame, relative to a keyframe.
+    /// Receives the time stamp, ns, and the final pose of a tracked frame, relative to a keyframe. It is not called for a frame
+    /// that is lost.
     fn end_frame(&mut self, _config: &DynamicConfig, _timestamp_ns: i64, _pose: KeyframeRelativePose) {}
 
-    /// Returns the regions of the last frame that were found to move.
+    /// Returns the regions of the last frame that move, for display and statistics.
     fn regions(&self) -> &[Region] {
         &[]
     }
 
-    /// Returns what moves in the last frame, whose depth image is given, for the dense map: also what was trusted because too few features
-    /// were left.
+    /// Returns the pixels of the last frame that move, for the dense map; `depth` is its depth image. They include regions whose
+    /// features were trusted only because too few others remained.
     fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
         MovingMask::from_regions(self.regions().to_vec())
     }
 
-    /// Forgets earlier frames: a new world begins.
+    /// Removes everything remembered of earlier frames: the map was reset, poses refer to a new world.
     fn reset_history(&mut self) {}
 
-    /// Returns whether the filter uses bounding boxes or masks of movable objects.
+    /// Returns whether the filter uses detections or masks of movable objects. If not, the system does not run the detector for it.
     fn needs_boxes(&self) -> bool {
         true
     }
 
-    /// Returns whether landmarks are removed from the map when measured depth shows free space where they were.
+    /// Returns whether the visibility check removes landmarks from the map where the measured depth proves free space.
     fn checks_visibility(&self) -> bool {
         false
     }

@@ -1,4 +1,7 @@
-//! Parts of the image that move, as boxes with depths, and the features on them.
+//! Regions of the image that move, as bounding boxes with a depth interval.
+//!
+//! In: regions, the depth image, the features of a frame. Out: the trust of the features, and the mask of what moves for the dense
+//! map.
 
 use crate::config::DynamicConfig;
 use crate::context::SensorModel;
@@ -7,43 +10,44 @@ use crate::dynamic::segment::mask::InstanceMask;
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
 
-/// A part of the image that was found to move.
+/// A region of the image that moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
-    /// Where it is, px of the raw image.
+    /// Bounding box, px of the raw image.
     pub bbox: BoundingBox,
-    /// Confidence of the detection it rests on.
+    /// Score of the detection that it comes from, in [0, 1].
     pub score: f32,
-    /// Frames since that detection; 0 if it is of this frame.
+    /// Frames since that detection; 0 if the detection is of this frame.
     pub misses: usize,
-    /// Depths of the moving body, m; `None` if the whole box moves.
+    /// Depth interval of the moving object, m; `None` if everything in the box moves.
     pub depth_m: Option<[f32; 2]>,
 }
 
-/// What moves in a frame, pixel by pixel.
+/// The pixels of a frame that move.
 #[derive(Clone, Debug, Default)]
 pub struct MovingMask {
-    /// Segmenter.
-    pub(super) bodies: InstanceMask,
-    /// Boxes, whole or at the depth of a body.
+    /// Mask of the segmented instances.
+    pub(super) instances: InstanceMask,
+    /// Boxes that move as a whole or within a depth interval.
     pub(super) regions: Vec<Region>,
 }
 
 impl MovingMask {
-    /// Returns the mask of regions, each whole or at the depth of its body.
+    /// Returns the mask of these regions.
     pub fn from_regions(regions: Vec<Region>) -> Self {
         Self { regions, ..Self::default() }
     }
 
-    /// Whether a position of the raw image, px, shows something that moves, or lies within `edge_px` of it.
+    /// Returns whether a position, px of the raw image, lies on something that moves or within `edge_px` of it; `depth` is the
+    /// depth image of the frame, px.
     pub fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
-        self.bodies.covers(raw, edge_px) || self.regions.iter().any(|region| region.covers(depth, raw, edge_px))
+        self.instances.covers(raw, edge_px) || self.regions.iter().any(|region| region.covers(depth, raw, edge_px))
     }
 }
 
-/// Distrusts the features of all regions. If that leaves too few, the regions of least confidence are given up one by one: a false box
-/// must not take the ground from under tracking. Those go to `given_up`.
-pub(super) fn apply(
+/// Sets the trust of each feature: 0 in a moving region, else 1. If fewer than `config.min_trusted` features remain, the regions of
+/// the lowest score are moved to `given_up` one by one: a false detection must not make tracking fail.
+pub(super) fn apply_regions(
     config: &DynamicConfig,
     regions: &mut Vec<Region>,
     given_up: &mut Vec<Region>,
@@ -69,23 +73,24 @@ pub(super) fn apply(
 }
 
 impl Region {
-    /// Whether a feature at a raw position belongs to the moving body: inside the box, at the body's depth or without depth, or with the
-    /// body within `edge_px` of it.
+    /// Returns whether a feature at a position, px of the raw image, belongs to the moving object: it lies inside the box, and
+    /// within the depth interval, without a measured depth, or within `edge_px` of the object.
     pub fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
         let [x, y] = raw;
         if !self.bbox.contains(x, y) {
             return false;
         }
         let Some([near, far]) = self.depth_m else { return true };
-        let at = |dx: f32, dy: f32| depth.metres((x + dx + 0.5).max(0.0) as usize, (y + dy + 0.5).max(0.0) as usize);
-        let moves = |z: f32| z >= near && z <= far;
-        if at(0.0, 0.0).is_none_or(moves) {
+        let depth_at =
+            |dx: f32, dy: f32| depth.metres((x + dx + 0.5).max(0.0) as usize, (y + dy + 0.5).max(0.0) as usize);
+        let in_interval = |z: f32| z >= near && z <= far;
+        if depth_at(0.0, 0.0).is_none_or(in_interval) {
             return true;
         }
-        // A corner on the outline belongs to neither side: its descriptor sees both.
+        // The descriptor of a corner at the edge of the object covers object and background: it is not static.
         let (r, h) = (edge_px, edge_px * std::f32::consts::FRAC_1_SQRT_2);
         [(r, 0.0), (-r, 0.0), (0.0, r), (0.0, -r), (h, h), (h, -h), (-h, h), (-h, -h)]
             .iter()
-            .any(|&(dx, dy)| at(dx, dy).is_some_and(moves))
+            .any(|&(dx, dy)| depth_at(dx, dy).is_some_and(in_interval))
     }
 }

@@ -1,10 +1,11 @@
-//! Method `yf`: inside a box, what has the depth of the body is dropped and the background stays (YF-SLAM section 3.3).
+//! Method `yf`: inside a bounding box, the depth group of the person is excluded and the background is kept (YF-SLAM, section 3.3).
 //!
-//! In: boxes, the depth image, the frame's features. Out: for each track, the depths that move.
+//! In: detections, the depth image, the features of the frame. Out: the trust of each feature; for each track, the depth interval
+//! that moves.
 
 use crate::config::DynamicConfig;
 use crate::detect::BoundingBox;
-use crate::dynamic::region::apply;
+use crate::dynamic::region::apply_regions;
 use crate::dynamic::segment::depth_clusters::DepthClusters;
 use crate::dynamic::segment::segmenter::Segmenter;
 use crate::dynamic::tracks::Tracks;
@@ -12,29 +13,34 @@ use crate::dynamic::{DynamicFilter, FilterInput, MovingMask, Region};
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
 
-/// Follows boxes over time and cuts bodies out of them by depth.
+/// The filter of YF-SLAM: tracks bounding boxes and excludes the depth group of the person in each.
 #[derive(Clone, Debug)]
 pub(super) struct YfSlam {
     tracks: Tracks,
-    groups: DepthClusters,
+    clusters: DepthClusters,
     regions: Vec<Region>,
-    /// Regions whose features are needed, though they move.
+    /// Regions whose features are trusted all the same, because too few others remained.
     given_up: Vec<Region>,
 }
 
 impl YfSlam {
-    /// Draws start from `seed`.
+    /// Returns a filter whose random draws start from `seed`.
     pub(super) fn new(seed: u64) -> Self {
-        Self { tracks: Tracks::default(), groups: DepthClusters::new(seed), regions: Vec::new(), given_up: Vec::new() }
+        Self {
+            tracks: Tracks::default(),
+            clusters: DepthClusters::new(seed),
+            regions: Vec::new(),
+            given_up: Vec::new(),
+        }
     }
 
-    /// Notes the moving region of each track, and the body's depth in the track. A track that was missed and shows no body at its depth
-    /// any more is dropped.
-    fn cut_out(&mut self, config: &DynamicConfig, depth: &DepthImage, features: &FrameFeatures) {
-        let Self { tracks, groups, regions, .. } = self;
+    /// Computes the moving region of each track and stores the depth of the person in the track. A track without a detection in
+    /// this frame ends if no depth group is found at its depth.
+    fn update_regions(&mut self, config: &DynamicConfig, depth: &DepthImage, features: &FrameFeatures) {
+        let Self { tracks, clusters, regions, .. } = self;
         tracks.list.retain_mut(|track| {
-            let Some(center_m) = groups.body_of(config, track, depth, features) else {
-                // No valid depth: whatever is in a box that was just detected moves; an old box is given up.
+            let Some(center_m) = clusters.track_depth(config, track, depth, features) else {
+                // Without valid depth everything in a detected box is taken to move; a track without a detection ends.
                 if track.misses == 0 {
                     regions.push(Region { bbox: track.bbox, score: track.score, misses: 0, depth_m: None });
                 }
@@ -42,7 +48,7 @@ impl YfSlam {
             };
             track.depth_m = Some(center_m);
             regions.push(Region {
-                bbox: grown(&track.bbox, config.margin),
+                bbox: grow(&track.bbox, config.margin),
                 score: track.score,
                 misses: track.misses,
                 depth_m: Some([
@@ -59,10 +65,10 @@ impl DynamicFilter for YfSlam {
     fn before_pose(&mut self, config: &DynamicConfig, input: &FilterInput<'_>, features: &mut FrameFeatures) {
         let &FilterInput { movable, depth, sensor, .. } = input;
         self.regions.clear();
-        let depths = self.groups.depths_of(config, movable, depth, features);
+        let depths = self.clusters.depths_in_boxes(config, movable, depth, features);
         self.tracks.update(config, config.max_misses, movable, depths, [depth.raw.width(), depth.raw.height()]);
-        self.cut_out(config, depth, features);
-        apply(config, &mut self.regions, &mut self.given_up, depth, features, sensor);
+        self.update_regions(config, depth, features);
+        apply_regions(config, &mut self.regions, &mut self.given_up, depth, features, sensor);
     }
 
     fn regions(&self) -> &[Region] {
@@ -71,15 +77,15 @@ impl DynamicFilter for YfSlam {
 
     fn moving_mask(&self, config: &DynamicConfig, depth: &DepthImage) -> MovingMask {
         let mut segmenter = Segmenter::default();
-        segmenter.bodies.begin(depth);
-        segmenter.outline(config, &mut self.groups.clone(), &mut self.tracks.clone(), 0.0);
+        segmenter.instances.begin_frame(depth);
+        segmenter.segment(config, &mut self.clusters.clone(), &mut self.tracks.clone(), 0.0);
         let regions = self.regions.iter().chain(&self.given_up).copied().collect();
-        MovingMask { bodies: segmenter.bodies, regions }
+        MovingMask { instances: segmenter.instances, regions }
     }
 }
 
-/// The box with its sides moved out by `share` of its size.
-fn grown(b: &BoundingBox, share: f32) -> BoundingBox {
+/// Returns the box grown on each side by `share` of its size.
+fn grow(b: &BoundingBox, share: f32) -> BoundingBox {
     let (dx, dy) = (share * (b.x_max - b.x_min), share * (b.y_max - b.y_min));
     BoundingBox { x_min: b.x_min - dx, y_min: b.y_min - dy, x_max: b.x_max + dx, y_max: b.y_max + dy }
 }

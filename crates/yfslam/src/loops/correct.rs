@@ -1,8 +1,8 @@
-//! What a loop changes in the map (ORB-SLAM, IEEE T-RO 2015, section VII): the near side moves to where the far side says it is,
-//! duplicates are joined, and the error is spread over the way between them. Where the old place is of another submap there is no
-//! such way: the whole submap moves, and the two become one.
+//! Correction of the map by a loop (ORB-SLAM, IEEE T-RO 2015, section VII): the keyframes around the new keyframe move to the pose
+//! that verification found, duplicate landmarks are fused, and the error is distributed over the pose graph. If the candidate
+//! belongs to another submap there is no drift to distribute: the whole submap moves, and the two are merged.
 //!
-//! In: a keyframe located among the landmarks of an old place. Out: a corrected map, to be adjusted.
+//! In: a keyframe localised among the landmarks of a candidate. Out: the corrected map, for global bundle adjustment.
 
 use slotmap::SecondaryMap;
 
@@ -14,67 +14,66 @@ use crate::mapping::fuse;
 use crate::optimize::pose_graph::{Edge, PoseGraph};
 use crate::tracking::TrackedFrame;
 
-/// The two sides of a loop, and all poses as they were.
-struct Loop {
-    /// The keyframe that came back, and its covisible ones.
+/// The state of a loop correction: the near side is the new keyframe with its neighbours, the far side the candidate's group.
+struct LoopCorrection {
+    /// The new keyframe and its covisible keyframes.
     near: Vec<KeyFrameId>,
     /// Poses before the correction, `t_cam_world`.
     before: SecondaryMap<KeyFrameId, Pose>,
-    /// Poses of the near side as the far side has them, `s_cam_world`, into the unit that the near side has.
-    moved: SecondaryMap<KeyFrameId, Similarity>,
-    /// Landmarks that moved with a keyframe of the near side.
-    carried: SecondaryMap<LandmarkId, KeyFrameId>,
-    /// Pairs of a near and a far keyframe that came to share landmarks.
+    /// Corrected poses of the near side, `s_cam_world`, into the unit of the near side.
+    corrected: SecondaryMap<KeyFrameId, Similarity>,
+    /// Landmarks that were moved with a keyframe of the near side.
+    moved_landmarks: SecondaryMap<LandmarkId, KeyFrameId>,
+    /// Pairs of a near and a far keyframe that became covisible.
     links: Vec<(KeyFrameId, KeyFrameId)>,
 }
 
-/// Closes the loop between `keyframe` and the place of `candidate`, in which it was located as `located`: there, `s_cam_place` maps the
-/// place's world into its camera and unit.
+/// Closes the loop between `keyframe` and `candidate`; `localised` is the keyframe as a frame localised there, and
+/// `s_cam_candidate` maps the candidate's world into its camera and unit.
 pub(super) fn close(
     context: &Context,
     map: &mut Map,
     keyframe: KeyFrameId,
     candidate: &Candidate,
-    located: &TrackedFrame,
-    s_cam_place: &Similarity,
+    localised: &TrackedFrame,
+    s_cam_candidate: &Similarity,
 ) {
-    let Context { sensor: _, config: _ } = context;
     let Some(k) = map.keyframe(keyframe) else { return };
-    let s_far_near = s_cam_place.inverse() * k.t_cam_world;
-    let is_one_map = map.root(keyframe) == map.root(candidate.keyframe);
-    if !is_one_map {
+    let s_far_near = s_cam_candidate.inverse() * k.t_cam_world;
+    let is_one_submap = map.root(keyframe) == map.root(candidate.keyframe);
+    if !is_one_submap {
         map.merge_submaps(keyframe, candidate.keyframe, &s_far_near);
     }
-    // Once welded, both have the same unit.
-    let s_cam_world = if is_one_map { *s_cam_place } else { unscaled(&rigid(s_cam_place)) };
-    let Some(mut ends) = Loop::new(map, keyframe, &s_cam_world) else { return };
-    ends.move_near_side(map);
-    ends.join(context, map, keyframe, candidate, located);
+    // After the merge both have the same unit.
+    let s_cam_world = if is_one_submap { *s_cam_candidate } else { unscaled(&rigid(s_cam_candidate)) };
+    let Some(mut correction) = LoopCorrection::new(map, keyframe, &s_cam_world) else { return };
+    correction.correct_near_side(map);
+    correction.fuse_landmarks(context, map, keyframe, candidate, localised);
     map.add_loop_edge(keyframe, candidate.keyframe);
-    if is_one_map {
-        ends.spread(context, map, keyframe);
+    if is_one_submap {
+        correction.optimize_pose_graph(context, map, keyframe);
     }
 }
 
-impl Loop {
+impl LoopCorrection {
     fn new(map: &Map, keyframe: KeyFrameId, s_cam_world: &Similarity) -> Option<Self> {
         let k = map.keyframe(keyframe)?;
         let near: Vec<KeyFrameId> = std::iter::once(keyframe).chain(k.covisible.iter().map(|(id, _)| *id)).collect();
-        let correction = k.t_cam_world.inverse() * s_cam_world;
+        let motion = k.t_cam_world.inverse() * s_cam_world;
         let before: SecondaryMap<KeyFrameId, Pose> = map.keyframes().map(|(id, k)| (id, k.t_cam_world)).collect();
-        let moved = near.iter().filter_map(|id| Some((*id, *before.get(*id)? * correction))).collect();
-        Some(Self { near, before, moved, carried: SecondaryMap::new(), links: Vec::new() })
+        let corrected = near.iter().filter_map(|id| Some((*id, *before.get(*id)? * motion))).collect();
+        Some(Self { near, before, corrected, moved_landmarks: SecondaryMap::new(), links: Vec::new() })
     }
 
-    /// Moves the keyframes of the near side, all in the same way, with all landmarks they see.
-    fn move_near_side(&mut self, map: &mut Map) {
+    /// Moves the keyframes of the near side by the same correction, with all landmarks that they observe.
+    fn correct_near_side(&mut self, map: &mut Map) {
         for &id in &self.near {
-            let (Some(&old), Some(&new)) = (self.before.get(id), self.moved.get(id)) else { continue };
+            let (Some(&old), Some(&new)) = (self.before.get(id), self.corrected.get(id)) else { continue };
             let Some(keyframe) = map.keyframe(id) else { continue };
-            let seen: Vec<LandmarkId> = keyframe.observed().map(|(_, l)| l).collect();
-            for landmark in seen {
+            let observed: Vec<LandmarkId> = keyframe.observed().map(|(_, l)| l).collect();
+            for landmark in observed {
                 let Some(position) = map.landmark(landmark).map(|l| l.position) else { continue };
-                if self.carried.insert(landmark, id).is_none() {
+                if self.moved_landmarks.insert(landmark, id).is_none() {
                     map.set_position(landmark, new.inverse() * (old * position));
                 }
             }
@@ -82,17 +81,16 @@ impl Loop {
         }
     }
 
-    /// Joins what both sides see, and notes which keyframes that connects.
-    fn join(
+    /// Fuses the landmarks that both sides observe, and stores which keyframes became covisible.
+    fn fuse_landmarks(
         &mut self,
         context: &Context,
         map: &mut Map,
         keyframe: KeyFrameId,
         candidate: &Candidate,
-        located: &TrackedFrame,
+        localised: &TrackedFrame,
     ) {
-        let Context { sensor: _, config: _ } = context;
-        for (feature, matched) in located.matches.iter().enumerate() {
+        for (feature, matched) in localised.matches.iter().enumerate() {
             let Some(far) = matched.and_then(|s| s.landmark) else { continue };
             match map.keyframe(keyframe).and_then(|k| k.landmarks.get(feature).copied()) {
                 Some(Some(near)) => map.merge_landmarks(far, near),
@@ -119,19 +117,19 @@ impl Loop {
         self.links.dedup();
     }
 
-    /// Spreads the error over the essential graph: the spanning tree, all loops, and strong covisibility.
-    fn spread(&self, context: &Context, map: &mut Map, keyframe: KeyFrameId) {
+    /// Distributes the error by pose-graph optimisation of the essential graph: spanning tree, loop edges, strong covisibility.
+    fn optimize_pose_graph(&self, context: &Context, map: &mut Map, keyframe: KeyFrameId) {
         let Context { sensor, config } = context;
         let Some(root) = map.root(keyframe) else { return };
         let members = map.submap(root);
-        // In the order of time the equations are nearly a band. The root, which defines the world, stays.
+        // In temporal order the matrix of the equations is almost banded. The root, which defines the world, is fixed.
         let mut order: Vec<(bool, u64, KeyFrameId)> =
             members.iter().filter_map(|id| Some((*id != root, map.keyframe(*id)?.sequence, *id))).collect();
         order.sort_unstable();
         let order: Vec<KeyFrameId> = order.into_iter().map(|(.., id)| id).collect();
         let index: SecondaryMap<KeyFrameId, usize> = order.iter().enumerate().map(|(i, id)| (*id, i)).collect();
         let before = |id: KeyFrameId| self.before.get(id).map(unscaled);
-        let base = |id: KeyFrameId| self.moved.get(id).copied().or_else(|| before(id));
+        let base = |id: KeyFrameId| self.corrected.get(id).copied().or_else(|| before(id));
         let is_link = |a, b| self.links.binary_search(&(a, b)).is_ok() || self.links.binary_search(&(b, a)).is_ok();
         let mut graph = PoseGraph::default();
         for &a in &order {
@@ -143,7 +141,8 @@ impl Loop {
             others.sort_unstable();
             others.dedup();
             for b in others {
-                // Each pair once, from its later member; links are the new measurements, the rest keeps its shape.
+                // Each pair is added once, from its later member. Links are the new measurements; all other edges keep their
+                // relative pose.
                 let (Some(&i), Some(&j)) = (index.get(a), index.get(b)) else { continue };
                 let pose_of = |id| if is_link(a, b) { base(id) } else { before(id) };
                 if let (true, Some(s_a), Some(s_b)) = (i > j || keyframe.parent == Some(b), pose_of(a), pose_of(b)) {
@@ -154,7 +153,7 @@ impl Loop {
         graph.solve(&config.pose_graph, !sensor.measures_depth);
         for id in map.landmarks_of(&members) {
             let Some(landmark) = map.landmark(id) else { continue };
-            let anchor = self.carried.get(id).copied().unwrap_or(landmark.reference);
+            let anchor = self.moved_landmarks.get(id).copied().unwrap_or(landmark.reference);
             let (Some(base), Some(&i)) = (base(anchor), index.get(anchor)) else { continue };
             let position = graph.poses[i].inverse() * (base * landmark.position);
             map.set_position(id, position);

@@ -1,32 +1,32 @@
-//! An index of landmarks by their descriptors, without a vocabulary: multi-index hashing (Norouzi, Punjani and Fleet, Fast Search in
+//! An index of landmarks by descriptor, without a vocabulary: multi-index hashing (Norouzi, Punjani and Fleet, Fast Search in
 //! Hamming Space with Multi-Index Hashing, CVPR 2012).
 //!
-//! In: landmarks of the map. Out: those whose descriptor is near a given one. A descriptor is entered in several tables, in each
-//! under another 16 of its 256 bits, and sought there under those bits and under all that differ in one of them: two descriptors that
-//! differ in 30 bits miss each other in all tables once in 40 times. Each landmark is a word of its own; nothing is trained, and an
-//! empty index costs nothing.
+//! In: landmarks of the map. Out: those whose descriptor is near a given one. Each of several tables holds all descriptors under
+//! another 16 of their 256 bits. A query is looked up in each table under those bits and under all that differ in one of them: two
+//! descriptors that differ in 30 bits miss each other in all tables once in 40 times. Nothing is trained, and an empty index costs
+//! nothing.
 
 use slotmap::SecondaryMap;
 
 use crate::features::Descriptor;
 use crate::map::{LandmarkId, Map};
 
-/// Tables; a descriptor of 256 bits has room for 16.
+/// Number of tables; a descriptor of 256 bits has room for 16.
 const TABLES: usize = 8;
 /// Bits of a key.
 const KEY_BITS: usize = 16;
 /// End of a chain.
 const NONE: u32 = u32::MAX;
 
-/// Landmarks to be found by descriptor.
+/// An index of landmarks by descriptor.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LandmarkIndex {
     items: Vec<Item>,
-    /// For each table and key the first item of a chain; empty until the first landmark comes.
+    /// First item of the chain of each table and key; empty until the first landmark is added.
     heads: Vec<u32>,
-    known: SecondaryMap<LandmarkId, ()>,
-    /// Number of the last query that met each item.
-    met: Vec<u32>,
+    indexed: SecondaryMap<LandmarkId, ()>,
+    /// Number of the last query that reached each item.
+    last_query: Vec<u32>,
     queries: u32,
 }
 
@@ -34,14 +34,14 @@ pub(super) struct LandmarkIndex {
 struct Item {
     landmark: LandmarkId,
     descriptor: Descriptor,
-    /// The next item with the same key, in each table.
+    /// Next item with the same key, in each table.
     next: [u32; TABLES],
 }
 
 impl LandmarkIndex {
-    /// Enters a landmark with the descriptor that it has now; one that is there already stays as it is.
+    /// Adds a landmark with its present descriptor; one that is indexed already stays as it is.
     pub(super) fn insert(&mut self, landmark: LandmarkId, descriptor: &Descriptor) {
-        if self.known.insert(landmark, ()).is_some() {
+        if self.indexed.insert(landmark, ()).is_some() {
             return;
         }
         if self.heads.is_empty() {
@@ -52,11 +52,11 @@ impl LandmarkIndex {
             std::mem::replace(&mut self.heads[table << KEY_BITS | usize::from(key(descriptor, table))], item)
         });
         self.items.push(Item { landmark, descriptor: *descriptor, next });
-        self.met.push(self.queries);
+        self.last_query.push(self.queries);
     }
 
-    /// Drops landmarks that the map no longer has, once they outnumber those it has.
-    pub(super) fn tidy(&mut self, map: &Map) {
+    /// Removes landmarks that the map no longer has, once they outnumber those it has.
+    pub(super) fn remove_stale(&mut self, map: &Map) {
         if self.items.len() > 2 * map.landmark_count() + 1000 {
             let items = std::mem::take(&mut self.items);
             *self = Self::default();
@@ -68,8 +68,8 @@ impl LandmarkIndex {
         }
     }
 
-    /// Calls `visit` with landmarks whose descriptor differs from `query` in at most `max_distance` bits, and the number of those bits.
-    /// Most of them, that is: the more bits differ, the more are missed.
+    /// Calls `visit` with landmarks whose descriptor differs from `query` in at most `max_distance` bits, and that number of bits.
+    /// The search is approximate: the more bits differ, the more landmarks are missed.
     #[inline(always)]
     pub(super) fn for_each_near(
         &mut self,
@@ -86,9 +86,9 @@ impl LandmarkIndex {
             for flip in std::iter::once(0).chain((0..KEY_BITS).map(|bit| 1u16 << bit)) {
                 let mut at = self.heads[table << KEY_BITS | usize::from(key ^ flip)];
                 while let Some(item) = self.items.get(at as usize) {
-                    let met = &mut self.met[at as usize];
-                    if *met != self.queries {
-                        *met = self.queries;
+                    let last_query = &mut self.last_query[at as usize];
+                    if *last_query != self.queries {
+                        *last_query = self.queries;
                         let distance = query.distance(&item.descriptor);
                         if distance <= max_distance {
                             visit(item.landmark, distance);
@@ -101,7 +101,7 @@ impl LandmarkIndex {
     }
 }
 
-/// The bits of a descriptor that table `table` goes by.
+/// Returns the bits of a descriptor that are the key in a table.
 #[inline(always)]
 fn key(descriptor: &Descriptor, table: usize) -> u16 {
     (descriptor.0[table * KEY_BITS / 64] >> (table * KEY_BITS % 64)) as u16
@@ -114,16 +114,16 @@ mod tests {
     use rand_pcg::rand_core::{Rng, SeedableRng};
     use slotmap::SlotMap;
 
-    /// `count` random descriptors entered under new ids.
+    /// Returns an index with `count` random descriptors under new ids.
     fn filled(rng: &mut Pcg64Mcg, count: usize) -> (LandmarkIndex, Vec<(LandmarkId, Descriptor)>) {
         let mut ids: SlotMap<LandmarkId, ()> = SlotMap::with_key();
         let mut index = LandmarkIndex::default();
-        let entered: Vec<_> =
+        let inserted: Vec<_> =
             (0..count).map(|_| (ids.insert(()), Descriptor(std::array::from_fn(|_| rng.next_u64())))).collect();
-        for (id, descriptor) in &entered {
+        for (id, descriptor) in &inserted {
             index.insert(*id, descriptor);
         }
-        (index, entered)
+        (index, inserted)
     }
 
     fn with_flips(rng: &mut Pcg64Mcg, descriptor: &Descriptor, flips: usize) -> Descriptor {
@@ -139,10 +139,10 @@ mod tests {
     #[test]
     fn near_descriptors_are_found_and_far_ones_are_not() {
         let mut rng = Pcg64Mcg::seed_from_u64(1);
-        let (mut index, entered) = filled(&mut rng, 5000);
+        let (mut index, inserted) = filled(&mut rng, 5000);
         for (flips, least_share) in [(0, 1.0), (15, 0.995), (30, 0.95), (45, 0.7)] {
             let mut found = 0;
-            for (id, descriptor) in entered.iter().step_by(10) {
+            for (id, descriptor) in inserted.iter().step_by(10) {
                 let query = with_flips(&mut rng, descriptor, flips);
                 index.for_each_near(&query, 50, |hit, distance| {
                     assert_eq!((hit, distance), (*id, flips as u32), "random descriptors differ in about 128 bits");
@@ -154,10 +154,10 @@ mod tests {
     }
 
     #[test]
-    fn a_landmark_entered_twice_is_found_once() {
+    fn a_landmark_added_twice_is_found_once() {
         let mut rng = Pcg64Mcg::seed_from_u64(2);
-        let (mut index, entered) = filled(&mut rng, 3);
-        let (id, descriptor) = entered[1];
+        let (mut index, inserted) = filled(&mut rng, 3);
+        let (id, descriptor) = inserted[1];
         index.insert(id, &descriptor);
         let mut hits = Vec::new();
         index.for_each_near(&descriptor, 10, |hit, _| hits.push(hit));

@@ -1,12 +1,13 @@
-//! Places seen before: finding the way back when lost, and closing loops (ORB-SLAM, IEEE T-RO 2015, sections V-C and VII; ORB-SLAM2,
-//! IEEE T-RO 2017, section III-C), without a vocabulary.
+//! Place recognition, relocalisation and loop closing (ORB-SLAM, IEEE T-RO 2015, sections V-C and VII; ORB-SLAM2, IEEE T-RO 2017,
+//! section III-C), without a vocabulary.
 //!
 //! ```text
-//! features ─► recognise ─► verify ─► similarity ─► correct
-//!             which place?  P3P      without depth  join, pose graph ─► whole: bundle adjustment
+//! features ─► place_recognition ─► verify ─► similarity ───► correct ───────► global_bundle
+//!              candidates            P3P       without depth   fuse landmarks,   bundle adjustment
+//!                                                              pose graph        of the submap
 //! ```
 //!
-//! In: keyframes, and frames whose pose is unknown. Out: poses, and a map without the drift of a way that led back.
+//! In: keyframes, and frames whose pose is unknown. Out: poses of relocalised frames; a map whose accumulated drift is corrected.
 
 mod correct;
 mod descriptor_index;
@@ -29,70 +30,72 @@ use crate::tracking::{Match, TrackedFrame};
 pub(crate) use global_bundle::GlobalBundle;
 use place_recognition::Candidate;
 pub(crate) use place_recognition::PlaceRecogniser;
-use verify::Evidence;
+use verify::Support;
 
-/// A loop that was closed.
+/// A loop closure.
 #[derive(Clone, Copy, Debug)]
 pub struct LoopClosure {
-    /// The keyframe that came back.
+    /// The keyframe that closed the loop.
     pub keyframe: KeyFrameId,
-    /// The keyframe of the old place that shares most with it.
+    /// The earlier keyframe that shows the same place: of the candidate's keyframes the one with most matches.
     pub to: KeyFrameId,
-    /// Landmarks of the old place that fit.
+    /// Number of the candidate's landmarks that are inliers of the keyframe's pose.
     pub inliers: usize,
-    /// How the keyframe's estimate differed from the old place's: `s_estimated_located`, in the camera's frame. Its scale is 1 where depth
-    /// is measured; else it is the unit of length around the keyframe in that of the old place.
+    /// Correction `s_estimated_localised`: from the pose that verification gave the keyframe to the pose it had, in the camera
+    /// frame. Its scale is 1 where depth is measured; else it is the unit of length around the keyframe in that around `to`.
     pub drift: Similarity,
-    /// The motion between the two, as measured.
+    /// Measured relative pose of the two keyframes: maps points of `to` into `keyframe`, m.
     pub t_keyframe_to: Pose,
-    /// Whether the old place was of another submap, so that two became one: `drift` is then the motion between their worlds.
+    /// Whether the loop joined two submaps: `drift` is then the motion between their worlds.
     pub merged_submaps: bool,
 }
 
-/// Where a camera that is lost can be at most.
+/// The region in which a lost camera can be.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchRegion {
-    /// The keyframe that it was last seen from.
+    /// Reference keyframe of the last tracked frame.
     pub reference: KeyFrameId,
-    /// Where it was then, in the world of that keyframe, m.
+    /// Position of the camera then, in the world of that keyframe, m.
     pub center_world: Point3<f64>,
-    /// How far it can have come since, m.
+    /// Distance that it can have moved since then, m.
     pub radius_m: f64,
-    /// Likeness that a place within reach must have.
+    /// Match ratio that a candidate inside the region needs.
     pub min_match_ratio: f64,
 }
 
 impl SearchRegion {
-    fn includes(&self, map: &Map, place: KeyFrameId, t_cam_world: &Pose) -> bool {
+    /// Returns whether a pose found at a keyframe lies in the region.
+    fn includes(&self, map: &Map, candidate: KeyFrameId, t_cam_world: &Pose) -> bool {
         let center = t_cam_world.inverse_transform_point(&Point3::origin());
-        (center - self.center_world).norm() <= self.radius_m && map.root(place) == map.root(self.reference)
+        (center - self.center_world).norm() <= self.radius_m && map.root(candidate) == map.root(self.reference)
     }
 }
 
-/// Seeks a frame in the whole map. Returns whether it was found: its pose and matches are set then. Of several places that it may show
-/// the likeliest is taken; one beyond `reach` has to be likelier.
+/// Relocalises a frame in the whole map. Returns whether that succeeded: its pose and matches are set then. Of several candidates
+/// the one with the highest match ratio is taken; a candidate outside `region` needs a higher ratio.
 pub(crate) fn relocalise(
     recogniser: &mut PlaceRecogniser,
     context: &Context,
     map: &Map,
     frame: &mut TrackedFrame,
-    reach: Option<&SearchRegion>,
+    region: Option<&SearchRegion>,
 ) -> bool {
-    let Context { sensor: _, config } = context;
+    let config = &context.config;
     let c = &config.places;
     let candidates = recogniser.candidates(c, map, &frame.features, |_| true);
-    let needed = Evidence { inliers: c.relocalise_min_inliers, match_ratio: c.relocalise_min_match_ratio };
+    let needed = Support { inliers: c.relocalise_min_inliers, match_ratio: c.relocalise_min_match_ratio };
     let mut best: Option<(f64, Pose, Vec<Option<Match>>)> = None;
-    for place in &candidates {
-        let Some(evidence) = verify::locate(context, map, place, frame, &needed) else { continue };
-        let within = reach.is_some_and(|reach| reach.includes(map, place.keyframe, &frame.t_cam_world));
-        tracing::debug!(?evidence, within, "a place to be found at");
-        let limit = reach.filter(|_| within).map_or(c.relocalise_min_match_ratio_beyond, |reach| reach.min_match_ratio);
-        if evidence.match_ratio < limit {
+    for candidate in &candidates {
+        let Some(support) = verify::localise(context, map, candidate, frame, &needed) else { continue };
+        let within = region.is_some_and(|region| region.includes(map, candidate.keyframe, &frame.t_cam_world));
+        tracing::debug!(?support, within, "relocalisation candidate");
+        let limit =
+            region.filter(|_| within).map_or(c.relocalise_min_match_ratio_beyond, |region| region.min_match_ratio);
+        if support.match_ratio < limit {
             continue;
         }
-        if best.as_ref().is_none_or(|(match_ratio, ..)| evidence.match_ratio > *match_ratio) {
-            best = Some((evidence.match_ratio, frame.t_cam_world, frame.matches.clone()));
+        if best.as_ref().is_none_or(|(match_ratio, ..)| support.match_ratio > *match_ratio) {
+            best = Some((support.match_ratio, frame.t_cam_world, frame.matches.clone()));
         }
     }
     let Some((_, t_cam_world, matches)) = best else { return false };
@@ -100,24 +103,25 @@ pub(crate) fn relocalise(
     true
 }
 
-/// Closes loops.
+/// Detects and closes loops.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LoopCloser {
-    /// Places that the last keyframe resembled, with the number of keyframes in a row that agreed.
+    /// Candidate groups of the last keyframe, each with the number of consecutive keyframes that agree on it.
     consistent: Vec<(Vec<KeyFrameId>, usize)>,
     /// Sequence number of the keyframe that closed the last loop.
     last_loop: Option<u64>,
+    /// The keyframe as a frame, for verification.
     frame: TrackedFrame,
 }
 
 impl LoopCloser {
-    /// Forgets all places and loops.
+    /// Removes all candidates and loops.
     pub(crate) fn reset(&mut self) {
         self.consistent.clear();
         self.last_loop = None;
     }
 
-    /// Looks whether a new keyframe shows an old place, and closes the loop if so; the map is then to be adjusted as a whole.
+    /// Searches a loop for a new keyframe, and closes it. Global bundle adjustment is left to the caller.
     pub(crate) fn close(
         &mut self,
         context: &Context,
@@ -125,7 +129,7 @@ impl LoopCloser {
         map: &mut Map,
         keyframe: KeyFrameId,
     ) -> Option<LoopClosure> {
-        let Context { sensor: _, config } = context;
+        let config = &context.config;
         let k = map.keyframe(keyframe)?;
         let (sequence, estimated) = (k.sequence, k.t_cam_world);
         if self.last_loop.is_some_and(|last| sequence < last + config.loops.min_keyframes_between) {
@@ -134,28 +138,28 @@ impl LoopCloser {
         }
         self.frame.features.clone_from(&k.features);
         let candidates =
-            old_places(&mut recogniser.lock().unwrap_or_else(PoisonError::into_inner), config, map, keyframe);
-        for place in self.consistent_ones(config, candidates) {
+            loop_candidates(&mut recogniser.lock().unwrap_or_else(PoisonError::into_inner), config, map, keyframe);
+        for candidate in self.consistent_candidates(config, candidates) {
             let c = &config.loops;
-            let needed = Evidence { inliers: c.min_inliers, match_ratio: c.min_match_ratio };
-            let found = verify::locate(context, map, &place, &mut self.frame, &needed);
-            let Some(evidence) = found else { continue };
-            let Some(s_cam_place) = self.place_seen_from(context, map, keyframe, &place) else { continue };
-            let drift = estimated * s_cam_place.inverse();
-            let plausible = drift_gate::is_plausible(c, map, keyframe, place.keyframe, &drift);
-            tracing::debug!(?evidence, %drift, plausible, "an old place");
-            if !plausible && evidence.match_ratio < c.min_match_ratio_of_jump {
+            let needed = Support { inliers: c.min_inliers, match_ratio: c.min_match_ratio };
+            let verified = verify::localise(context, map, &candidate, &mut self.frame, &needed);
+            let Some(support) = verified else { continue };
+            let Some(s_cam_candidate) = self.similarity_to(context, map, keyframe, &candidate) else { continue };
+            let drift = estimated * s_cam_candidate.inverse();
+            let plausible = drift_gate::is_plausible(c, map, keyframe, candidate.keyframe, &drift);
+            tracing::debug!(?support, %drift, plausible, "loop candidate");
+            if !plausible && support.match_ratio < c.min_match_ratio_of_jump {
                 continue;
             }
-            let t_keyframe_to = rigid(&s_cam_place) * map.keyframe(place.keyframe)?.t_cam_world.inverse();
-            let merged_submaps = map.root(keyframe) != map.root(place.keyframe);
-            correct::close(context, map, keyframe, &place, &self.frame, &s_cam_place);
+            let t_keyframe_to = rigid(&s_cam_candidate) * map.keyframe(candidate.keyframe)?.t_cam_world.inverse();
+            let merged_submaps = map.root(keyframe) != map.root(candidate.keyframe);
+            correct::close(context, map, keyframe, &candidate, &self.frame, &s_cam_candidate);
             self.last_loop = Some(sequence);
             self.consistent.clear();
             return Some(LoopClosure {
                 keyframe,
-                to: place.keyframe,
-                inliers: evidence.inliers,
+                to: candidate.keyframe,
+                inliers: support.inliers,
                 drift,
                 t_keyframe_to,
                 merged_submaps,
@@ -164,40 +168,46 @@ impl LoopCloser {
         None
     }
 
-    /// Where the world of the old place is in the camera that was located there, in the unit of the keyframe.
-    fn place_seen_from(
+    /// Returns the similarity from the candidate's world into the camera of the keyframe, in the unit of the keyframe.
+    fn similarity_to(
         &self,
         context: &Context,
         map: &Map,
         keyframe: KeyFrameId,
-        place: &Candidate,
+        candidate: &Candidate,
     ) -> Option<Similarity> {
-        let Context { sensor, config: _ } = context;
+        let sensor = &context.sensor;
         if sensor.measures_depth {
             return Some(unscaled(&self.frame.t_cam_world));
         }
-        similarity::measure(context, map, keyframe, place, &self.frame)
+        similarity::measure(context, map, keyframe, candidate, &self.frame)
     }
 
-    /// Those candidates that the last keyframes agreed on: a candidate agrees with an earlier one if their groups overlap.
-    fn consistent_ones(&mut self, config: &Config, candidates: Vec<Candidate>) -> Vec<Candidate> {
+    /// Returns the candidates on which enough consecutive keyframes agree: candidates agree if their groups share a keyframe.
+    fn consistent_candidates(&mut self, config: &Config, candidates: Vec<Candidate>) -> Vec<Candidate> {
         let previous = std::mem::take(&mut self.consistent);
         let mut chosen = Vec::new();
-        for place in candidates {
-            let agree = |group: &[KeyFrameId]| group.iter().any(|id| place.group.contains(id));
-            let times = previous.iter().filter(|(group, _)| agree(group)).map(|(_, times)| *times).max();
-            let times = 1 + times.unwrap_or(0);
-            self.consistent.push((place.group.clone(), times));
-            if times >= config.loops.min_consistent {
-                chosen.push(place);
+        for candidate in candidates {
+            let agree = |group: &[KeyFrameId]| group.iter().any(|id| candidate.group.contains(id));
+            let count = previous.iter().filter(|(group, _)| agree(group)).map(|(_, count)| *count).max();
+            let count = 1 + count.unwrap_or(0);
+            self.consistent.push((candidate.group.clone(), count));
+            if count >= config.loops.min_consistent {
+                chosen.push(candidate);
             }
         }
         chosen
     }
 }
 
-/// Places that resemble the keyframe and are not within two steps of covisibility, where tracking and mapping look anyway.
-fn old_places(recogniser: &mut PlaceRecogniser, config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<Candidate> {
+/// Returns candidates for a loop: keyframes that are not within two steps of covisibility, where tracking and mapping match
+/// landmarks anyway.
+fn loop_candidates(
+    recogniser: &mut PlaceRecogniser,
+    config: &Config,
+    map: &Map,
+    keyframe: KeyFrameId,
+) -> Vec<Candidate> {
     let Some(k) = map.keyframe(keyframe) else { return Vec::new() };
     let covisible = |k: &KeyFrame| k.covisible.iter().map(|(id, _)| (*id, ())).collect::<Vec<_>>();
     let mut near: SecondaryMap<KeyFrameId, ()> = covisible(k).into_iter().chain([(keyframe, ())]).collect();
@@ -208,6 +218,6 @@ fn old_places(recogniser: &mut PlaceRecogniser, config: &Config, map: &Map, keyf
         local.insert(landmark, ());
     }
     let mut candidates = recogniser.candidates(&config.places, map, &k.features, |id| !local.contains_key(id));
-    candidates.retain(|place| !near.contains_key(place.keyframe));
+    candidates.retain(|candidate| !near.contains_key(candidate.keyframe));
     candidates
 }

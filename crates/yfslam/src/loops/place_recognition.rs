@@ -1,7 +1,7 @@
-//! Which keyframes show the place that an image shows.
+//! Place recognition: which keyframes show the same place as an image.
 //!
-//! In: the features of an image, the index of landmarks. Out: groups of covisible keyframes that see the same landmarks, with the
-//! matches. As in a bag of words (Sivic and Zisserman, ICCV 2003), a feature that fits many keyframes says little.
+//! In: the features of an image, the index of landmarks. Out: candidates, each a group of covisible keyframes with the matches to
+//! their landmarks. As in a bag of words (Sivic and Zisserman, ICCV 2003), a feature that matches many keyframes counts little.
 
 use slotmap::SecondaryMap;
 
@@ -10,18 +10,18 @@ use crate::config::PlaceConfig;
 use crate::features::FrameFeatures;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 
-/// A place that may be the one in the image.
+/// A place that the image may show.
 #[derive(Clone, Debug)]
 pub(crate) struct Candidate {
-    /// The keyframe that shares most with the image.
+    /// The keyframe with the highest score.
     pub keyframe: KeyFrameId,
     /// That keyframe and its covisible ones.
     pub group: Vec<KeyFrameId>,
-    /// Features of the image with the landmark of the group that looks most alike.
+    /// Features of the image, each with the landmark of the group whose descriptor is nearest.
     pub matches: Vec<(u32, LandmarkId)>,
 }
 
-/// Recognises places. Buffers are reused.
+/// Place recognition by the descriptors of landmarks. Buffers are reused.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PlaceRecogniser {
     index: LandmarkIndex,
@@ -40,29 +40,30 @@ struct Vote {
 }
 
 impl PlaceRecogniser {
-    /// Enters the landmarks of a keyframe that other keyframes see too.
-    pub(crate) fn learn(&mut self, map: &Map, keyframe: KeyFrameId) {
+    /// Adds the landmarks of a keyframe that other keyframes observe too.
+    pub(crate) fn add_keyframe(&mut self, map: &Map, keyframe: KeyFrameId) {
         let Some(keyframe) = map.keyframe(keyframe) else { return };
         for (_, id) in keyframe.observed() {
             if let Some(landmark) = map.landmark(id).filter(|l| l.observations.len() > 1) {
                 self.index.insert(id, &landmark.descriptor);
             }
         }
-        self.index.tidy(map);
+        self.index.remove_stale(map);
     }
 
-    /// Forgets all landmarks.
+    /// Removes all landmarks.
     pub(crate) fn reset(&mut self) {
         *self = Self::default();
     }
 
-    /// The places that most resemble an image, best first. Only trusted features count, and only landmarks that `may_count` lets.
+    /// Returns the candidates for an image, best first. Only trusted features count, and only landmarks for which `accepts` returns
+    /// true.
     pub(crate) fn candidates(
         &mut self,
         config: &PlaceConfig,
         map: &Map,
         features: &FrameFeatures,
-        may_count: impl Fn(LandmarkId) -> bool,
+        accepts: impl Fn(LandmarkId) -> bool,
     ) -> Vec<Candidate> {
         self.hits.clear();
         for (i, feature) in features.features.iter().enumerate() {
@@ -70,7 +71,7 @@ impl PlaceRecogniser {
                 let from = self.hits.len();
                 let hits = &mut self.hits;
                 self.index.for_each_near(&features.descriptors[i], config.max_distance, |landmark, distance| {
-                    if may_count(landmark) {
+                    if accepts(landmark) {
                         hits.push((i as u32, distance, landmark));
                     }
                 });
@@ -99,7 +100,8 @@ impl PlaceRecogniser {
         candidates
     }
 
-    /// Each feature votes once for each keyframe that sees one of its landmarks, the more the fewer those are.
+    /// Adds up the scores: each feature votes once for each keyframe that observes one of its landmarks, with a weight that falls
+    /// with the number of such keyframes.
     fn vote(&mut self, map: &Map) {
         self.votes.clear();
         let keyframes = map.keyframe_count() as f64;
@@ -122,10 +124,11 @@ impl PlaceRecogniser {
         }
     }
 
-    /// For each feature the nearest landmark that the group sees; of features with the same landmark, the nearest.
+    /// Returns for each feature the nearest landmark that the group observes; of features with the same landmark only the nearest
+    /// is kept.
     fn matches(&self, map: &Map, group: &[KeyFrameId]) -> Vec<(u32, LandmarkId)> {
-        let seen = |id| map.landmark(id).is_some_and(|l| l.observations.iter().any(|(k, _)| group.contains(k)));
-        let nearest = |hits: &[Hit]| hits.iter().find(|hit| seen(hit.2)).copied();
+        let is_observed = |id| map.landmark(id).is_some_and(|l| l.observations.iter().any(|(k, _)| group.contains(k)));
+        let nearest = |hits: &[Hit]| hits.iter().find(|hit| is_observed(hit.2)).copied();
         let mut matches: Vec<Hit> = self.hits.chunk_by(|a, b| a.0 == b.0).filter_map(nearest).collect();
         matches.sort_unstable_by_key(|&(feature, distance, landmark)| (landmark, distance, feature));
         matches.dedup_by_key(|hit| hit.2);

@@ -1,7 +1,7 @@
-//! Where the camera stands in a place that was recognised: P3P in RANSAC (Fischler and Bolles, 1981), then a guided search, as ORB-SLAM
-//! relocalises (IEEE T-RO 2015, section V-C).
+//! Verification of a candidate: the pose by P3P in RANSAC (Fischler and Bolles, 1981), then a guided search, as in the
+//! relocalisation of ORB-SLAM (IEEE T-RO 2015, section V-C).
 //!
-//! In: a frame and a candidate. Out: the frame's pose and matches, or the verdict that it is not there.
+//! In: a frame and a candidate. Out: the frame's pose and matches, or none.
 
 use nalgebra::{Point3, Vector3};
 use rand_pcg::Pcg64Mcg;
@@ -17,36 +17,37 @@ use crate::optimize::residual::Measurement;
 use crate::tracking::search::{Projector, search_local_map};
 use crate::tracking::{Match, TrackedFrame};
 
-/// What speaks for a pose.
+/// The support of a pose by matches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Evidence {
-    /// Landmarks that fit it.
+pub(super) struct Support {
+    /// Number of inliers.
     pub inliers: usize,
-    /// Landmarks that fit it and look the same, as a share of what tracking would find there, going by how often it found each of those
-    /// in view and not behind what moves. Corridors are alike in their doors and lamps: there many landmarks fit, but more are missing.
+    /// Match ratio: the number of inliers with a similar descriptor, divided by the number that tracking would find from this pose.
+    /// That is the sum of the found ratios of the landmarks in view that are not behind moving objects. In corridors with repeated
+    /// doors and lamps many landmarks are inliers of a wrong pose, but more are missing.
     pub match_ratio: f64,
 }
 
-impl Evidence {
-    /// Whether there is as much of both as `needed`.
-    pub(super) fn suffices(&self, needed: &Self) -> bool {
+impl Support {
+    /// Returns whether both values reach those of `needed`.
+    pub(super) fn reaches(&self, needed: &Self) -> bool {
         self.inliers >= needed.inliers && self.match_ratio >= needed.match_ratio
     }
 }
 
-/// Locates `frame` in the place of `candidate`. Pose and matches are then those of the frame. `None` if the evidence is less than
-/// `needed`, or leaves open where the camera is.
-pub(super) fn locate(
+/// Localises `frame` among the landmarks of `candidate`; sets its pose and matches. `None` if the support is less than `needed`, or
+/// if the matches do not fix the position well enough.
+pub(super) fn localise(
     context: &Context,
     map: &Map,
     candidate: &Candidate,
     frame: &mut TrackedFrame,
-    needed: &Evidence,
-) -> Option<Evidence> {
+    needed: &Support,
+) -> Option<Support> {
     let Context { sensor, config } = context;
     let c = &config.places;
     let pairs: Vec<Pair> = candidate.matches.iter().filter_map(|m| Pair::new(sensor, map, frame, *m)).collect();
-    // Depth, where measured, tells the true one of the solutions.
+    // Depth, where measured, selects among the solutions of P3P.
     let pose = ransac(
         c,
         pairs.len(),
@@ -74,20 +75,22 @@ pub(super) fn locate(
         visible.dedup();
         let projector = Projector::new(sensor, &frame.t_cam_world);
         let in_view = visible.iter().filter_map(|id| map.landmark(*id));
-        expected = in_view.filter(|l| !is_hidden(c, &projector, frame, l)).map(Landmark::found_ratio).sum();
+        expected = in_view.filter(|l| !is_occluded(c, &projector, frame, l)).map(Landmark::found_ratio).sum();
         inliers = frame.refine_pose(context);
     }
     let projector = Projector::new(sensor, &frame.t_cam_world);
-    let alike = frame.matches.iter().zip(&frame.features.descriptors).filter(|(matched, seen)| {
+    let similar = frame.matches.iter().zip(&frame.features.descriptors).filter(|(matched, descriptor)| {
         let landmark = matched.and_then(|s| map.landmark(s.landmark?));
-        landmark.is_some_and(|l| l.descriptor.distance(seen) <= c.max_distance && !is_hidden(c, &projector, frame, l))
+        landmark.is_some_and(|l| {
+            l.descriptor.distance(descriptor) <= c.max_distance && !is_occluded(c, &projector, frame, l)
+        })
     });
-    let evidence = Evidence { inliers, match_ratio: alike.count() as f64 / expected.max(1.0) };
+    let support = Support { inliers, match_ratio: similar.count() as f64 / expected.max(1.0) };
     let is_fixed = position_sigma_m(sensor, frame) <= c.max_position_sigma_m;
-    (is_fixed && evidence.suffices(needed)).then_some(evidence)
+    (is_fixed && support.reaches(needed)).then_some(support)
 }
 
-/// How well the matches fix the camera's position, m.
+/// Returns the standard deviation of the camera position given the matches, m.
 fn position_sigma_m(sensor: &SensorModel, frame: &TrackedFrame) -> f64 {
     let matched = frame
         .matches
@@ -105,17 +108,17 @@ fn position_sigma_m(sensor: &SensorModel, frame: &TrackedFrame) -> f64 {
     pose_only::position_sigma_m(&sensor.pinhole, &frame.t_cam_world, &observations)
 }
 
-/// Whether something that moves is where the landmark should be seen: it may stand in front of it.
-fn is_hidden(config: &PlaceConfig, projector: &Projector<'_>, frame: &TrackedFrame, landmark: &Landmark) -> bool {
+/// Returns whether something that moves is at the projection of a landmark and may occlude it.
+fn is_occluded(config: &PlaceConfig, projector: &Projector<'_>, frame: &TrackedFrame, landmark: &Landmark) -> bool {
     let Some(projection) = projector.project(&landmark.position) else { return false };
-    let mut hidden = false;
+    let mut occluded = false;
     frame.features.for_each_near(projection.u, projection.v, config.hidden_radius_px, 0..=u8::MAX, |j| {
-        hidden |= frame.features.features[j].trust <= 0.0;
+        occluded |= frame.features.features[j].trust <= 0.0;
     });
-    hidden
+    occluded
 }
 
-/// Landmarks that the keyframes see and the frame is not matched to.
+/// Returns the landmarks that the keyframes observe and the frame does not match.
 fn unmatched_landmarks(map: &Map, keyframes: &[KeyFrameId], frame: &TrackedFrame) -> Vec<LandmarkId> {
     let mut matched: Vec<LandmarkId> = frame.matches.iter().flatten().filter_map(|s| s.landmark).collect();
     matched.sort_unstable();
@@ -133,7 +136,7 @@ struct Pair {
     landmark: LandmarkId,
     point_world: Point3<f64>,
     measurement: Measurement,
-    /// Direction in which the feature is seen, unit length.
+    /// Viewing ray of the feature, unit length.
     ray: Vector3<f64>,
 }
 
@@ -156,8 +159,8 @@ impl Pair {
     }
 }
 
-/// The model that most of `count` pairs fit, if at least `min_inliers` do; models are made from three pairs each. Draws end when a better
-/// one has become unlikely.
+/// Returns the model with most inliers among `count` pairs, if they are at least `min_inliers`; each model is made from three
+/// pairs. It ends when a better model has become unlikely.
 pub(super) fn ransac<M: Copy, I: IntoIterator<Item = M>>(
     config: &PlaceConfig,
     count: usize,
@@ -168,7 +171,7 @@ pub(super) fn ransac<M: Copy, I: IntoIterator<Item = M>>(
     if count < min_inliers.max(3) {
         return None;
     }
-    // Seeded anew for each call: a result depends on its input alone.
+    // The generator is seeded anew for each call: a result depends on its input alone.
     let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
     let mut draw = || ((u64::from(rng.next_u32()) * count as u64) >> 32) as usize;
     let mut best: Option<(usize, M)> = None;
@@ -182,7 +185,7 @@ pub(super) fn ransac<M: Copy, I: IntoIterator<Item = M>>(
             continue;
         }
         for model in models(sample) {
-            // What does not even explain its own three pairs, where they tell more than it was made from, is wrong.
+            // A model must fit its own three pairs, which hold more data than it was made from.
             if !sample.iter().all(|i| fits(&model, *i)) {
                 continue;
             }

@@ -1,8 +1,8 @@
-//! Method `dms`: motion statistics over a sliding window, as DMS-SLAM (Liu et al., Sensors 19(17), 2019) has them from GMS (Bian et al.,
-//! CVPR 2017). No detector.
+//! Method `dms`: motion statistics over a sliding window (DMS-SLAM, Liu et al., Sensors 19(17), 2019), after GMS (Bian et al., CVPR
+//! 2017). It uses no detector.
 //!
-//! In: the features of frames some time apart. Out: trust for those whose match is shared by their neighbours. Only the abstract of
-//! DMS-SLAM was at hand: window and search radius are ours.
+//! In: the features of this frame and of an earlier one. Out: trust for features whose match is supported by those of their
+//! neighbours. Only the abstract of DMS-SLAM was available: window and search radius are our choice.
 
 use std::collections::VecDeque;
 
@@ -11,44 +11,44 @@ use crate::context::SensorModel;
 use crate::dynamic::{DynamicFilter, FilterInput};
 use crate::features::{Descriptor, FrameFeatures};
 
-/// Frames between the two that are compared.
+/// Number of frames between the two that are compared.
 const WINDOW: usize = 5;
-/// Distance within which a match is sought, px.
+/// Search radius of a match, px.
 const RADIUS_PX: f32 = 80.0;
-/// Bits in which two descriptors of one point may differ.
+/// Largest Hamming distance of a match.
 const MAX_BITS: u32 = 60;
-/// Cells on a side of the grid. Source: GMS.
+/// Number of grid cells along each side. Source: GMS.
 const GRID: usize = 20;
-/// Factor of the root of the number of features in a cell above which its support is not by chance. Source: GMS.
+/// Factor of the square root of the number of features in a cell; above that, the support of a match is not by chance. Source: GMS.
 const ALPHA: f32 = 6.0;
 
-/// The features of an earlier frame: where they are, undistorted px, their level and what they look like.
+/// The features of an earlier frame: position, undistorted px, with pyramid level, and descriptor.
 #[derive(Clone, Debug, Default)]
-struct Earlier {
-    at: Vec<([f32; 2], u8)>,
+struct PastFrame {
+    positions: Vec<([f32; 2], u8)>,
     descriptors: Vec<Descriptor>,
 }
 
-/// Trusts what moves like its neighbours. Buffers are reused.
+/// The filter that trusts features which move like their neighbours. Buffers are reused.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DmsSlam {
-    window: VecDeque<Earlier>,
-    /// The feature of each match, where it was and where it is.
+    window: VecDeque<PastFrame>,
+    /// For each match the feature, its earlier position and its position now, px.
     matches: Vec<(u32, [f32; 2], [f32; 2])>,
-    /// Matches between each cell of the earlier picture and each of this one.
+    /// Number of matches between each cell of the earlier frame and each cell of this one.
     counts: Vec<u16>,
-    /// Matches in each cell of the earlier picture.
-    inside: Vec<u16>,
-    /// For each cell of the earlier picture, the one that most of its matches lead to.
+    /// Number of matches in each cell of the earlier frame.
+    matches_in_cell: Vec<u16>,
+    /// For each cell of the earlier frame, the cell to which most of its matches lead, if they are supported.
     target: Vec<Option<usize>>,
 }
 
 impl DmsSlam {
-    /// Matches an earlier frame's features with those near by in this one.
-    fn match_with(&mut self, features: &FrameFeatures) {
+    /// Matches the features of the earlier frame with those within the search radius in this one.
+    fn match_earlier_frame(&mut self, features: &FrameFeatures) {
         self.matches.clear();
         let Some(earlier) = self.window.front() else { return };
-        for (&([u, v], octave), descriptor) in earlier.at.iter().zip(&earlier.descriptors) {
+        for (&([u, v], octave), descriptor) in earlier.positions.iter().zip(&earlier.descriptors) {
             let mut best: Option<(u32, usize)> = None;
             features.for_each_near(u, v, RADIUS_PX, octave.saturating_sub(1)..=octave + 1, |i| {
                 let bits = descriptor.distance(&features.descriptors[i]);
@@ -63,8 +63,8 @@ impl DmsSlam {
         }
     }
 
-    /// Trusts the features of matches that enough neighbours share, on a grid shifted by a share of a cell.
-    fn support(&mut self, sensor: &SensorModel, shift: [f32; 2], features: &mut FrameFeatures) {
+    /// Trusts the features whose match is supported by enough neighbours, on a grid shifted by `shift` cells.
+    fn trust_supported(&mut self, sensor: &SensorModel, shift: [f32; 2], features: &mut FrameFeatures) {
         let (b, cells) = (&sensor.bounds, GRID * GRID);
         let cell = |[u, v]: [f32; 2], [dx, dy]: [f32; 2]| {
             let column = (u - b.u_min) / (b.u_max - b.u_min) * GRID as f32 + dx;
@@ -74,12 +74,12 @@ impl DmsSlam {
         };
         self.counts.clear();
         self.counts.resize(cells * cells, 0);
-        self.inside.clear();
-        self.inside.resize(cells, 0);
+        self.matches_in_cell.clear();
+        self.matches_in_cell.resize(cells, 0);
         for &(_, from, to) in &self.matches {
             if let (Some(a), Some(b)) = (cell(from, shift), cell(to, [0.0; 2])) {
                 self.counts[a * cells + b] += 1;
-                self.inside[a] += 1;
+                self.matches_in_cell[a] += 1;
             }
         }
         self.target.clear();
@@ -97,18 +97,18 @@ impl DmsSlam {
         }
     }
 
-    /// Whether the cells around two cells share matches more often than by chance.
+    /// Returns whether the cells around two cells share more matches than would occur by chance.
     fn is_supported(&self, a: usize, b: usize) -> bool {
-        let at = |cell: usize, dx: isize, dy: isize| {
+        let neighbour = |cell: usize, dx: isize, dy: isize| {
             let (column, row) = ((cell % GRID).checked_add_signed(dx)?, (cell / GRID).checked_add_signed(dy)?);
             (column < GRID && row < GRID).then_some(row * GRID + column)
         };
         let (mut shared, mut features, mut pairs) = (0.0, 0.0, 0.0);
         for dy in -1..=1 {
             for dx in -1..=1 {
-                if let (Some(a), Some(b)) = (at(a, dx, dy), at(b, dx, dy)) {
+                if let (Some(a), Some(b)) = (neighbour(a, dx, dy), neighbour(b, dx, dy)) {
                     shared += f32::from(self.counts[a * GRID * GRID + b]);
-                    features += f32::from(self.inside[a]);
+                    features += f32::from(self.matches_in_cell[a]);
                     pairs += 1.0;
                 }
             }
@@ -120,10 +120,10 @@ impl DmsSlam {
 impl DynamicFilter for DmsSlam {
     fn before_pose(&mut self, config: &DynamicConfig, input: &FilterInput<'_>, features: &mut FrameFeatures) {
         if self.window.len() >= WINDOW {
-            self.match_with(features);
+            self.match_earlier_frame(features);
             features.features.iter_mut().for_each(|f| f.trust = 0.0);
             for shift in [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5], [0.5, 0.5]] {
-                self.support(input.sensor, shift, features);
+                self.trust_supported(input.sensor, shift, features);
             }
             let trusted = features.features.iter().filter(|f| f.trust > 0.0).count();
             if trusted < config.min_trusted {
@@ -131,8 +131,8 @@ impl DynamicFilter for DmsSlam {
             }
         }
         let mut earlier = if self.window.len() >= WINDOW { self.window.pop_front() } else { None }.unwrap_or_default();
-        earlier.at.clear();
-        earlier.at.extend(features.features.iter().map(|f| ([f.u, f.v], f.octave)));
+        earlier.positions.clear();
+        earlier.positions.extend(features.features.iter().map(|f| ([f.u, f.v], f.octave)));
         earlier.descriptors.clone_from(&features.descriptors);
         self.window.push_back(earlier);
     }

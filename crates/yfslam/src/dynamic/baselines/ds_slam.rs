@@ -1,8 +1,9 @@
-//! Method `ds`: the moving-consistency check of DS-SLAM (Yu et al., IROS 2018, section III-C).
+//! Method `ds`: the moving consistency check of DS-SLAM (Yu et al., IROS 2018, section III-C).
 //!
-//! In: pictures in a row, boxes or a mask of people. Out: while anything that moves against the epipolar geometry lies on a person, all
-//! people are dropped; else nobody is. Bodies come from boxes and depth, where the paper has a segmentation network; the corners that are
-//! followed are those of the last frame's features. Nothing is carried over frames without boxes, as in the paper.
+//! In: consecutive images, detections or a mask of people. Out: while a corner that violates the epipolar geometry lies on a
+//! person, the features on all people are excluded; else none are. People are segmented from boxes and depth, where the paper has a
+//! segmentation network; the tracked corners are those of the last frame's features. As in the paper, people are not tracked over
+//! frames without detections.
 
 use rand_pcg::Pcg32;
 
@@ -17,77 +18,79 @@ use crate::features::FrameFeatures;
 use crate::geometry::{Pair, epipolar_distance, fundamental_ransac};
 use crate::image::{DepthImage, Flow};
 
-/// Corners that are followed at most. This and what follows: DS-SLAM.
+/// Number of corners that are tracked at most. Source of this and the following constants: DS-SLAM.
 const MAX_CORNERS: usize = 1000;
-/// A corner that comes nearer to the border is given up, px.
+/// Distance from the image border below which a corner is dropped, px.
 const BORDER_PX: f32 = 5.0;
-/// Sum of absolute differences of 3 × 3 px above which a corner is given up.
+/// Sum of absolute differences of 3 × 3 px above which a corner is dropped.
 const MAX_DIFFERENCE: f32 = 2120.0;
-/// Distance from its epipolar line up to which a pair fits a fundamental matrix, px.
+/// Distance from the epipolar line up to which a pair is an inlier of a fundamental matrix, px.
 const RANSAC_LIMIT_PX: f64 = 0.1;
-/// Confidence of the search for that matrix.
+/// Confidence of the RANSAC for that matrix.
 const CONFIDENCE: f64 = 0.99;
-/// Distance from its epipolar line above which a corner moves, px.
+/// Distance from the epipolar line above which a corner moves, px.
 const MOVING_PX: f64 = 1.0;
-/// Distance from a person within which a moving corner speaks for the person's moving, px.
+/// Distance from a person up to which a moving corner counts as evidence that the person moves, px.
 const REACH_PX: f32 = 15.0;
 
-/// Drops people while something on them moves. Buffers are reused.
+/// The filter that excludes people while a corner on one of them moves. Buffers are reused.
 #[derive(Clone, Debug)]
 pub(crate) struct DsSlam {
     flow: Flow,
-    /// Where the last frame has features, px.
+    /// Positions of the last frame's features, px of the raw image.
     corners: Vec<[f32; 2]>,
-    /// Where they lie in the last frame and in this one, undistorted; beside it, where in the raw image.
+    /// Undistorted positions of tracked corners in the last frame and in this one, px.
     pairs: Vec<Pair>,
-    raw: Vec<[f32; 2]>,
+    /// Positions of the same corners in this frame, px of the raw image.
+    positions_raw: Vec<[f32; 2]>,
     tracks: Tracks,
-    groups: DepthClusters,
+    clusters: DepthClusters,
     segmenter: Segmenter,
     rng: Pcg32,
     regions: Vec<Region>,
-    /// Whether people are dropped.
-    dropped: bool,
+    /// Whether a person moves in this frame.
+    people_move: bool,
 }
 
 impl DsSlam {
-    /// Draws start from `seed`.
+    /// Returns a filter whose random draws start from `seed`.
     pub(crate) fn new(seed: u64) -> Self {
         Self {
             flow: Flow::default(),
             corners: Vec::new(),
             pairs: Vec::new(),
-            raw: Vec::new(),
+            positions_raw: Vec::new(),
             tracks: Tracks::default(),
-            groups: DepthClusters::new(seed),
+            clusters: DepthClusters::new(seed),
             segmenter: Segmenter::default(),
             rng: Pcg32::new(seed, 0xd5),
             regions: Vec::new(),
-            dropped: false,
+            people_move: false,
         }
     }
 
-    /// Follows the corners of the last frame into this one.
-    fn follow(&mut self, camera: &Camera) {
+    /// Tracks the corners of the last frame into this one.
+    fn track_corners(&mut self, camera: &Camera) {
         let limit = [camera.width as f32 - BORDER_PX, camera.height as f32 - BORDER_PX];
         let undistorted = |[x, y]: [f32; 2]| camera.undistort_px(f64::from(x), f64::from(y)).map(|v| v as f32);
         self.pairs.clear();
-        self.raw.clear();
+        self.positions_raw.clear();
         for &from in &self.corners {
             let Some(to) = self.flow.follow(from) else { continue };
             let inside = (0..2).all(|axis| to[axis] >= BORDER_PX && to[axis] < limit[axis]);
             if inside && self.flow.difference(from, to).is_some_and(|d| d <= MAX_DIFFERENCE) {
                 self.pairs.push((undistorted(from), undistorted(to)));
-                self.raw.push(to);
+                self.positions_raw.push(to);
             }
         }
     }
 
-    /// Whether a corner that moves lies on a body or near one.
-    fn somebody_moves(&mut self) -> bool {
+    /// Returns whether a corner that moves lies on or near a person.
+    fn is_person_moving(&mut self) -> bool {
         let Some(f) = fundamental_ransac(&self.pairs, RANSAC_LIMIT_PX, CONFIDENCE, &mut self.rng) else { return false };
-        let moving = self.pairs.iter().zip(&self.raw).filter(|(pair, _)| epipolar_distance(&f, pair) > MOVING_PX);
-        moving.map(|(_, raw)| *raw).any(|raw| self.segmenter.bodies.covers(raw, REACH_PX))
+        let moving =
+            self.pairs.iter().zip(&self.positions_raw).filter(|(pair, _)| epipolar_distance(&f, pair) > MOVING_PX);
+        moving.map(|(_, raw)| *raw).any(|raw| self.segmenter.instances.covers(raw, REACH_PX))
     }
 }
 
@@ -95,16 +98,16 @@ impl DynamicFilter for DsSlam {
     fn before_pose(&mut self, config: &DynamicConfig, input: &FilterInput<'_>, features: &mut FrameFeatures) {
         let &FilterInput { movable, depth, sensor, .. } = input;
         self.flow.push(input.gray);
-        self.follow(&sensor.camera);
+        self.track_corners(&sensor.camera);
         self.tracks.list.clear();
-        let depths = self.groups.depths_of(config, movable, depth, features);
+        let depths = self.clusters.depths_in_boxes(config, movable, depth, features);
         self.tracks.update(config, 0, movable, depths, [depth.raw.width(), depth.raw.height()]);
-        self.segmenter.begin(input);
-        self.segmenter.outline(config, &mut self.groups, &mut self.tracks, 0.0);
-        self.dropped = self.somebody_moves();
+        self.segmenter.begin_frame(input);
+        self.segmenter.segment(config, &mut self.clusters, &mut self.tracks, 0.0);
+        self.people_move = self.is_person_moving();
         self.regions.clear();
-        if self.dropped {
-            self.segmenter.distrust(0.0, sensor, features);
+        if self.people_move {
+            self.segmenter.set_trust(0.0, sensor, features);
             self.regions.extend(self.tracks.list.iter().map(|track| track.region(config)));
         }
         self.corners.clear();
@@ -116,7 +119,7 @@ impl DynamicFilter for DsSlam {
     }
 
     fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
-        let bodies = if self.dropped { self.segmenter.bodies.clone() } else { InstanceMask::default() };
-        MovingMask { bodies, ..MovingMask::default() }
+        let instances = if self.people_move { self.segmenter.instances.clone() } else { InstanceMask::default() };
+        MovingMask { instances, ..MovingMask::default() }
     }
 }

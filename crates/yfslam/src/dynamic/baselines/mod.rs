@@ -1,4 +1,4 @@
-//! The dynamic filters of published systems on our front end and back end, for comparison, with the constants of the papers.
+//! Dynamic filters of published systems, with the constants of their papers, for comparison within the same SLAM system.
 
 mod dms_slam;
 mod ds_slam;

@@ -1,6 +1,7 @@
-//! How far away the body in a box is: Geometric Depth RANSAC (YF-SLAM section 3.3), guarded where it is known to fail.
+//! Depth of the object in a bounding box: Geometric Depth RANSAC (YF-SLAM, section 3.3), with checks for the cases in which it is
+//! known to fail.
 //!
-//! In: a box, the depth image, the frame's features. Out: the depth of the body.
+//! In: a box, the depth image, the features of the frame; or a box and the instance mask. Out: the depth of the object.
 
 use rand_pcg::Pcg32;
 
@@ -9,14 +10,14 @@ use crate::config::Grouping;
 use crate::detect::{BoundingBox, Detection};
 use crate::dynamic::depth_group::{DepthGroup, largest_exact, largest_ransac};
 use crate::dynamic::segment::mask::InstanceMask;
-use crate::dynamic::tracks::Track;
+use crate::dynamic::track::Track;
 use crate::features::FrameFeatures;
 use crate::image::DepthImage;
 
-/// Step between the pixels that stand for the depth of a box, px.
+/// Step between the sampled pixels of a box, px.
 const SAMPLE_STEP: usize = 4;
 
-/// Finds the depth group of the body in each box. Buffers are reused.
+/// Estimates the depth group of the object in each box. Buffers are reused.
 #[derive(Clone, Debug)]
 pub(crate) struct DepthClusters {
     rng: Pcg32,
@@ -32,7 +33,7 @@ impl Default for DepthClusters {
 }
 
 impl DepthClusters {
-    /// Draws start from `seed`.
+    /// Returns an estimator whose random draws start from `seed`.
     pub(crate) fn new(seed: u64) -> Self {
         Self {
             rng: Pcg32::new(seed, 0x5eed),
@@ -42,8 +43,8 @@ impl DepthClusters {
         }
     }
 
-    /// The depth of the body in each box, m; `None` where nothing was measured.
-    pub(crate) fn depths_of(
+    /// Returns the depth of the object in each box, m; `None` where nothing was measured.
+    pub(crate) fn depths_in_boxes(
         &mut self,
         config: &DynamicConfig,
         boxes: &[Detection],
@@ -52,58 +53,59 @@ impl DepthClusters {
     ) -> &[Option<f32>] {
         self.depths_m.clear();
         for detection in boxes {
-            self.collect(&detection.bbox, depth, features);
-            let body = self.body_in_front(config).map(|group| self.center(&group));
-            self.depths_m.push(body);
+            self.sample(&detection.bbox, depth, features);
+            let center_m = self.foremost_group(config).map(|group| self.center(&group));
+            self.depths_m.push(center_m);
         }
         &self.depths_m
     }
 
-    /// Depth of the body of a track in its box, m.
-    pub(crate) fn body_of(
+    /// Returns the depth of a track's object in its box, m.
+    pub(crate) fn track_depth(
         &mut self,
         config: &DynamicConfig,
         track: &Track,
         depth: &DepthImage,
         features: &FrameFeatures,
     ) -> Option<f32> {
-        self.collect(&track.bbox, depth, features);
-        let group = self.body(config, track)?;
+        self.sample(&track.bbox, depth, features);
+        let group = self.track_group(config, track)?;
         Some(self.center(&group))
     }
 
-    /// Depth of the body of a track in what other bodies leave free of its box, m, and how many of its cells that is.
-    pub(crate) fn body_in(
+    /// Returns the depth of a track's object among the cells of its box that have no label yet, m, and the number of cells in its
+    /// depth group.
+    pub(crate) fn unlabelled_track_depth(
         &mut self,
         config: &DynamicConfig,
         track: &Track,
-        bodies: &InstanceMask,
+        instances: &InstanceMask,
     ) -> Option<(f32, usize)> {
         self.feature_depths.clear();
         self.pixel_depths.clear();
-        bodies.free_depths(&track.bbox, &mut self.pixel_depths);
+        instances.unlabelled_depths(&track.bbox, &mut self.pixel_depths);
         self.pixel_depths.sort_unstable_by(f32::total_cmp);
-        let group = self.body(config, track)?;
+        let group = self.track_group(config, track)?;
         Some((self.center(&group), group.members))
     }
 
-    /// Depth of the body in a box, m, in what others leave free of it.
-    pub(crate) fn thing_in(
+    /// Returns the depth of the object in a box among the cells that have no label yet, m.
+    pub(crate) fn unlabelled_object_depth(
         &mut self,
         config: &DynamicConfig,
         bbox: &BoundingBox,
-        bodies: &InstanceMask,
+        instances: &InstanceMask,
     ) -> Option<f32> {
         self.feature_depths.clear();
         self.pixel_depths.clear();
-        bodies.free_depths(bbox, &mut self.pixel_depths);
+        instances.unlabelled_depths(bbox, &mut self.pixel_depths);
         self.pixel_depths.sort_unstable_by(f32::total_cmp);
-        let group = self.body_in_front(config)?;
+        let group = self.foremost_group(config)?;
         Some(self.center(&group))
     }
 
-    /// Sorted depths of the features and of a grid of pixels inside a box.
-    fn collect(&mut self, bbox: &BoundingBox, depth: &DepthImage, features: &FrameFeatures) {
+    /// Samples the sorted depths of the features and of a grid of pixels inside a box.
+    fn sample(&mut self, bbox: &BoundingBox, depth: &DepthImage, features: &FrameFeatures) {
         self.feature_depths.clear();
         self.feature_depths
             .extend(features.features.iter().filter(|f| bbox.contains(f.raw[0], f.raw[1])).filter_map(|f| f.depth_m));
@@ -118,25 +120,26 @@ impl DepthClusters {
         self.pixel_depths.sort_unstable_by(f32::total_cmp);
     }
 
-    /// The depth group of a track's body. A track that knows its depth is looked for there first.
-    fn body(&mut self, config: &DynamicConfig, track: &Track) -> Option<DepthGroup> {
+    /// Returns the depth group of a track's object. It is searched first around the depth that the track had.
+    fn track_group(&mut self, config: &DynamicConfig, track: &Track) -> Option<DepthGroup> {
         if let Some(z) = track.depth_m {
             let reach = config.group_half_width_m + config.max_depth_step_m * track.depth_age.max(1) as f32;
             let near = within(&self.pixel_depths, z - reach, z + reach);
             let group = largest_exact(near, 2.0 * config.group_half_width_m);
-            if group.is_some_and(|g| self.is_body(config, &g)) {
+            if group.is_some_and(|g| self.is_large_enough(config, &g)) {
                 return group;
             }
             if track.misses > 0 {
                 return None;
             }
         }
-        self.body_in_front(config)
+        self.foremost_group(config)
     }
 
-    /// The largest group of feature depths, as the paper has it, unless enough of the box's pixels lie in front of it: a box that is
-    /// mostly wall has its largest group behind the person. Then only what is in front is asked.
-    fn body_in_front(&mut self, config: &DynamicConfig) -> Option<DepthGroup> {
+    /// Returns the largest group of feature depths, as in the paper, unless a large enough share of the box's pixels is in front of
+    /// it: in a box that shows mostly wall the largest group is the wall behind the person. Then the group is searched among the
+    /// nearer pixels only.
+    fn foremost_group(&mut self, config: &DynamicConfig) -> Option<DepthGroup> {
         let width = 2.0 * config.group_half_width_m;
         let mut group = match config.grouping {
             Grouping::Ransac => largest_ransac(&self.feature_depths, width, &mut self.rng),
@@ -146,25 +149,25 @@ impl DepthClusters {
         loop {
             let in_front = within(&self.pixel_depths, 0.0, group.near_m - config.group_gap_m);
             match largest_exact(in_front, width) {
-                Some(nearer) if self.is_body(config, &nearer) => group = nearer,
+                Some(nearer) if self.is_large_enough(config, &nearer) => group = nearer,
                 _ => return Some(group),
             }
         }
     }
 
-    /// Whether a group of pixel depths is a large enough part of the box.
-    fn is_body(&self, config: &DynamicConfig, group: &DepthGroup) -> bool {
+    /// Returns whether a group of pixel depths is a large enough share of the box.
+    fn is_large_enough(&self, config: &DynamicConfig, group: &DepthGroup) -> bool {
         group.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32
     }
 
-    /// Median depth of the pixels of a group, m.
+    /// Returns the median depth of the pixels of a group, m.
     fn center(&self, group: &DepthGroup) -> f32 {
         let inside = within(&self.pixel_depths, group.near_m, group.far_m);
         inside.get(inside.len() / 2).copied().unwrap_or(0.5 * (group.near_m + group.far_m))
     }
 }
 
-/// The part of `sorted` in [from, to].
+/// Returns the part of `sorted` in [from, to].
 fn within(sorted: &[f32], from: f32, to: f32) -> &[f32] {
     let start = sorted.partition_point(|z| *z < from);
     let end = sorted.partition_point(|z| *z <= to).max(start);
