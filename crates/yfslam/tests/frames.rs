@@ -161,10 +161,10 @@ fn beside_screen(i: i64, is_person: bool) -> Frame {
 
 #[test]
 fn full_does_not_lose_the_camera_when_all_that_stands_is_taken_for_a_person() {
-    for (doubted_trust, is_lost) in [(0.0, true), (FullConfig::default().doubted_trust, false)] {
+    for (doubted_trust, is_lost) in [(0.0, true), (FullConfig::default().doubted_box_trust, false)] {
         let mut config = Config::default();
         config.dynamic.method = Method::Full;
-        config.dynamic.full.doubted_trust = doubted_trust;
+        config.dynamic.full.doubted_box_trust = doubted_trust;
         let mut slam = Slam::builder(camera()).config(config).build().unwrap();
         let poses: Vec<_> = (0..10).map(|i| slam.track(&beside_screen(i, i >= 5)).unwrap().t_world_cam).collect();
         assert!(poses[..5].iter().all(Option::is_some));

@@ -78,11 +78,11 @@ impl Classes {
         let log_odds = |p: f32| (p / (1.0 - p)).ln();
         let held = &mut self.blocks.entry(block).or_insert_with(|| vec![Held::default(); VOXELS])[place_of(voxel)];
         if held.class == 0 {
-            *held = Held { class, log_odds: if class > 0 { log_odds(config.hit) } else { 0.0 } };
+            *held = Held { class, log_odds: if class > 0 { log_odds(config.p_hit) } else { 0.0 } };
         } else if held.class == class {
-            held.log_odds = (held.log_odds + log_odds(config.hit)).min(log_odds(config.clamp_max));
+            held.log_odds = (held.log_odds + log_odds(config.p_hit)).min(log_odds(config.clamp_max));
         } else {
-            held.log_odds += log_odds(config.miss);
+            held.log_odds += log_odds(config.p_miss);
             if held.log_odds <= 0.0 {
                 *held = Held::default();
             }

@@ -69,8 +69,8 @@ impl Volume {
     pub(crate) fn new(config: &DenseConfig) -> Self {
         let log_odds = |p: f32| ((p / (1.0 - p)).ln() * PER_UNIT).round() as i16;
         let steps = Steps {
-            hit: log_odds(config.hit),
-            miss: log_odds(config.miss),
+            hit: log_odds(config.p_hit),
+            miss: log_odds(config.p_miss),
             least: log_odds(config.clamp_min),
             most: log_odds(config.clamp_max),
             occupied: log_odds(config.occupied),
@@ -84,7 +84,7 @@ impl Volume {
     }
 
     /// Enters patch number `number`, or moves it if it hangs elsewhere by now: if its surfaces may be off by more than
-    /// `follow_voxels`. `None` takes it out. Returns whether anything changed.
+    /// `refit_threshold_voxels`. `None` takes it out. Returns whether anything changed.
     pub(crate) fn place(
         &mut self,
         number: usize,
@@ -105,12 +105,12 @@ impl Volume {
         true
     }
 
-    /// Whether something within range has moved by more than `follow_voxels`.
+    /// Whether something within range has moved by more than `refit_threshold_voxels`.
     fn has_moved(&self, before: &Isometry3<f64>, now: &Isometry3<f64>) -> bool {
         let moved = before.inverse() * now;
         let turned = moved.rotation.angle() * f64::from(self.config.max_range_m);
         let Translation3 { vector, .. } = moved.translation;
-        vector.norm() + turned > f64::from(self.config.follow_voxels * self.config.resolution_m)
+        vector.norm() + turned > f64::from(self.config.refit_threshold_voxels * self.config.resolution_m)
     }
 
     fn enter(&mut self, number: usize, t_map_cam: &Isometry3<f64>, seen: Vec<Seen>) {

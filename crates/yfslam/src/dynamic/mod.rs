@@ -76,7 +76,7 @@ pub trait DynamicFilter: Send + Sync {
         false
     }
 
-    /// Gives features that boxes alone exclude the trust `dynamic.full.doubted_trust`, because the frame cannot be tracked without them.
+    /// Gives features that boxes alone exclude the trust `dynamic.full.doubted_box_trust`, because the frame cannot be tracked without them.
     /// Returns whether there are any.
     fn doubt_boxes(&mut self, _config: &DynamicConfig, _features: &mut FrameFeatures) -> bool {
         false

@@ -168,7 +168,7 @@ impl Track {
         self.depth_age = 0;
         let [x, y] = center(&self.bbox);
         let offset = [body.middle[0] - x, body.middle[1] - y];
-        let is_whole = body.cells as f32 >= config.full.whole_share * self.body.cells as f32;
+        let is_whole = body.cells as f32 >= config.full.full_visibility_share * self.body.cells as f32;
         if self.misses == 0 {
             self.body = Extent { middle: offset, cells: body.cells };
         } else if is_whole {

@@ -42,11 +42,11 @@ impl YfSlam {
             };
             track.depth_m = Some(center_m);
             regions.push(Region {
-                bbox: grown(&track.bbox, config.margin),
+                bbox: grown(&track.bbox, config.box_margin_share),
                 score: track.score,
                 misses: track.misses,
                 depth_m: Some([
-                    center_m - config.group_half_width_m - config.reach_m,
+                    center_m - config.group_half_width_m - config.limb_reach_m,
                     center_m + config.group_half_width_m,
                 ]),
             });

@@ -100,11 +100,11 @@ pub(crate) fn reconstruct(
     let Some(Hypothesis { motion, points, fitting, with_parallax }) = hypotheses.into_iter().next() else {
         return Err(Refused::NoModel);
     };
-    if (fitting as f64) < config.start_min_share * of as f64 {
+    if (fitting as f64) < config.init_min_inlier_share * of as f64 {
         Err(Refused::Contradicted { fitting, of })
-    } else if rival as f64 > config.start_max_rival * fitting as f64 {
+    } else if rival as f64 > config.init_max_rival_share * fitting as f64 {
         Err(Refused::Ambiguous { fitting, rival })
-    } else if with_parallax < config.start_min_points {
+    } else if with_parallax < config.init_min_points {
         Err(Refused::LittleParallax { with_parallax })
     } else {
         Ok(TwoView { t_second_first: motion, points, model })
@@ -146,7 +146,7 @@ fn ransac(config: &MonocularConfig, variance: f64, pairs: &[Pair]) -> Models {
     }
     // Seeded anew for each call: a result depends on its input alone.
     let mut rng = Pcg32::new(config.seed, 0x2_71e5);
-    for _ in 0..config.start_draws {
+    for _ in 0..config.init_ransac_iterations {
         let picked: [Pair; 8] =
             std::array::from_fn(|_| pairs[((u64::from(rng.next_u32()) * pairs.len() as u64) >> 32) as usize]);
         models.plane.challenge(homography(picked[..4].iter().copied()), pairs, variance);
@@ -222,7 +222,7 @@ impl Hypothesis {
         pairs: &[Pair],
         fits: &[Option<Pair>],
     ) -> Self {
-        let min_parallax = config.start_min_parallax_deg.to_radians();
+        let min_parallax = config.init_min_parallax_deg.to_radians();
         let t_first_second = motion.inverse();
         let is_seen_at = |p: Vector3<f64>, seen: &[f32; 2]| {
             let [u, v] = camera.project(&p);

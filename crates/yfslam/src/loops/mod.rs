@@ -79,7 +79,7 @@ pub(crate) fn relocalise(
     reach: Option<&SearchRegion>,
 ) -> bool {
     let Context { sensor: _, config } = context;
-    let c = &config.places;
+    let c = &config.place_recognition;
     let candidates = recogniser.candidates(c, map, &frame.features, |_| true);
     let needed = Evidence { inliers: c.relocalise_min_inliers, match_ratio: c.relocalise_min_match_ratio };
     let mut best: Option<(f64, Pose, Vec<Option<Match>>)> = None;
@@ -87,7 +87,7 @@ pub(crate) fn relocalise(
         let Some(evidence) = verify::locate(context, map, place, frame, &needed) else { continue };
         let within = reach.is_some_and(|reach| reach.includes(map, place.keyframe, &frame.t_cam_world));
         tracing::debug!(?evidence, within, "a place to be found at");
-        let limit = reach.filter(|_| within).map_or(c.relocalise_min_match_ratio_beyond, |reach| reach.min_match_ratio);
+        let limit = reach.filter(|_| within).map_or(c.relocalise_min_match_ratio_far, |reach| reach.min_match_ratio);
         if evidence.match_ratio < limit {
             continue;
         }
@@ -144,7 +144,7 @@ impl LoopCloser {
             let drift = estimated * s_cam_place.inverse();
             let plausible = drift_gate::is_plausible(c, map, keyframe, place.keyframe, &drift);
             tracing::debug!(?evidence, %drift, plausible, "an old place");
-            if !plausible && evidence.match_ratio < c.min_match_ratio_of_jump {
+            if !plausible && evidence.match_ratio < c.min_match_ratio_large_drift {
                 continue;
             }
             let t_keyframe_to = rigid(&s_cam_place) * map.keyframe(place.keyframe)?.t_cam_world.inverse();
@@ -207,7 +207,8 @@ fn old_places(recogniser: &mut PlaceRecogniser, config: &Config, map: &Map, keyf
     for (_, landmark) in near.keys().filter_map(|id| map.keyframe(id)).flat_map(|k| k.observed()) {
         local.insert(landmark, ());
     }
-    let mut candidates = recogniser.candidates(&config.places, map, &k.features, |id| !local.contains_key(id));
+    let mut candidates =
+        recogniser.candidates(&config.place_recognition, map, &k.features, |id| !local.contains_key(id));
     candidates.retain(|place| !near.contains_key(place.keyframe));
     candidates
 }

@@ -25,14 +25,14 @@ pub(super) fn measure(
     let (camera, needed) = (&sensor.pinhole, config.monocular.loop_min_pairs);
     let mut pairs = correspondences(sensor, map, keyframe, place, located);
     let mut s_place_cam = ransac(
-        &config.places,
+        &config.place_recognition,
         pairs.len(),
         needed,
         |sample| absolute_orientation(&sample.map(|i| (pairs[i].in_a, pairs[i].in_b))),
         |s_place_cam, i| pairs[i].fits(camera, s_place_cam),
     );
     let s_place_cam = s_place_cam.as_mut()?;
-    let inliers = optimize_similarity(camera, &config.pose, s_place_cam, &mut pairs);
+    let inliers = optimize_similarity(camera, &config.pose_optimizer, s_place_cam, &mut pairs);
     tracing::debug!(pairs = pairs.len(), inliers, scale = s_place_cam.scaling(), "surroundings and old place");
     // The camera's frame is the same on both sides but for its unit, and for what locating it left over.
     (inliers >= needed).then(|| s_place_cam.inverse() * located.t_cam_world)

@@ -94,7 +94,7 @@ impl TrackedFrame {
     /// Refines the pose from all matches and drops those that do not fit. Returns the number of inliers that are landmarks of the
     /// map with more than a single matched's worth of evidence.
     pub(crate) fn refine_pose(&mut self, context: &Context) -> usize {
-        let (sensor, config) = (&context.sensor, &context.config.pose);
+        let (sensor, config) = (&context.sensor, &context.config.pose_optimizer);
         self.observations.clear();
         self.observed.clear();
         for (i, matched) in self.matches.iter().enumerate() {

@@ -86,7 +86,7 @@ impl Full {
             }
         }
         for (t, (track, [same, other])) in self.tracks.list.iter_mut().zip(&self.verdicts).enumerate() {
-            if track.misses > 0 && *same as usize >= config.full.view_min_cells && same > other {
+            if track.misses > 0 && *same as usize >= config.full.history_min_cells && same > other {
                 track.ended = true;
                 self.segmenter.bodies.release(t);
                 self.unmapped.release(t);
@@ -159,7 +159,7 @@ impl DynamicFilter for Full {
         (0..self.tracks.list.len()).for_each(|track| self.segmenter.bodies.release(track));
         let mut any = false;
         for f in features.features.iter_mut().filter(|f| f.trust == 0.0 && !self.segmenter.bodies.covers(f.raw, 0.0)) {
-            f.trust = config.full.doubted_trust;
+            f.trust = config.full.doubted_box_trust;
             any = true;
         }
         any

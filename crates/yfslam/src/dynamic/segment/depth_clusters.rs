@@ -154,7 +154,7 @@ impl DepthClusters {
 
     /// Whether a group of pixel depths is a large enough part of the box.
     fn is_body(&self, config: &DynamicConfig, group: &DepthGroup) -> bool {
-        group.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32
+        group.members as f32 >= config.group_min_share * self.pixel_depths.len() as f32
     }
 
     /// Median depth of the pixels of a group, m.

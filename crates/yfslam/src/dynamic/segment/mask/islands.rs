@@ -14,8 +14,8 @@ impl InstanceMask {
     /// trunk is hidden, by the trunk itself or by somebody in front.
     pub(crate) fn add_islands(&mut self, config: &DynamicConfig, track: usize, bbox: &BoundingBox, center_m: f32) {
         let owner = owner(track);
-        let (inner, outer) = (self.cells(bbox, 0.0), self.cells(bbox, config.margin));
-        let reach_m = config.group_half_width_m + config.reach_m;
+        let (inner, outer) = (self.cells(bbox, 0.0), self.cells(bbox, config.box_margin_share));
+        let reach_m = config.group_half_width_m + config.limb_reach_m;
         for row in inner[1]..inner[3] {
             for column in inner[0]..inner[2] {
                 let seed = row * self.columns + column;

@@ -84,14 +84,14 @@ impl InstanceMask {
         }
     }
 
-    /// Marks the body of a track, whose middle is `center_m` away: the cells of the box at that depth, and those in the box grown by `config.margin`
+    /// Marks the body of a track, whose middle is `center_m` away: the cells of the box at that depth, and those in the box grown by `config.box_margin_share`
     /// to which the surface leads on without a step, over gaps without depth too. Of the gaps, those in the box are marked.
     /// Returns what was marked.
     pub(crate) fn grow(&mut self, config: &DynamicConfig, track: usize, bbox: &BoundingBox, center_m: f32) -> Extent {
         let owner = owner(track);
-        let (inner, outer) = (self.cells(bbox, 0.0), self.cells(bbox, config.margin));
+        let (inner, outer) = (self.cells(bbox, 0.0), self.cells(bbox, config.box_margin_share));
         let [near, far] = [center_m - config.group_half_width_m, center_m + config.group_half_width_m];
-        let [nearest, farthest] = [near - config.reach_m, far + config.reach_m];
+        let [nearest, farthest] = [near - config.limb_reach_m, far + config.limb_reach_m];
         self.body.clear();
         for row in inner[1]..inner[3] {
             for column in inner[0]..inner[2] {
@@ -152,10 +152,10 @@ impl InstanceMask {
     }
 
     /// How far away what a mask marked in a box is, m, infinite where that was not measured; `None` if it fills less than
-    /// `config.body_min_share` of the box.
+    /// `config.group_min_share` of the box.
     pub(crate) fn masked_depth(&mut self, config: &DynamicConfig, bbox: &BoundingBox) -> Option<f32> {
         let cells = self.collect_masked(bbox);
-        if self.body.is_empty() || (self.body.len() as f32) < config.body_min_share * cells as f32 {
+        if self.body.is_empty() || (self.body.len() as f32) < config.group_min_share * cells as f32 {
             return None;
         }
         self.body.retain(|reached| reached.depth_m > 0.0);
