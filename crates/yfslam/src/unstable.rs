@@ -56,7 +56,8 @@ impl PlaceProbe {
 
     /// Returns the keyframe most like the frame extracted last, and the number of matches with it and its neighbours.
     pub fn best(&mut self, map: &Map) -> Option<(KeyFrameId, usize)> {
-        let candidates = self.recogniser.candidates(&self.context.config.places, map, &self.features, |_| true);
+        let candidates =
+            self.recogniser.candidates(&self.context.config.place_recognition, map, &self.features, |_| true);
         candidates.first().map(|best| (best.keyframe, best.matches.len()))
     }
 }

@@ -161,16 +161,16 @@ fn beside_screen(i: i64, is_person: bool) -> Frame {
 
 #[test]
 fn full_keeps_tracking_when_a_false_detection_covers_the_static_scene() {
-    for (doubted_trust, is_lost) in [(0.0, true), (FullConfig::default().doubted_trust, false)] {
+    for (doubted_box_trust, is_lost) in [(0.0, true), (FullConfig::default().doubted_box_trust, false)] {
         let mut config = Config::default();
         config.dynamic.method = Method::Full;
-        config.dynamic.full.doubted_trust = doubted_trust;
+        config.dynamic.full.doubted_box_trust = doubted_box_trust;
         let mut slam = Slam::builder(camera()).config(config).build().unwrap();
         let poses: Vec<_> = (0..10).map(|i| slam.track(&beside_screen(i, i >= 5)).unwrap().t_world_cam).collect();
         assert!(poses[..5].iter().all(Option::is_some));
-        assert_eq!(poses[5..].iter().any(Option::is_none), is_lost, "{doubted_trust}: {poses:?}");
+        assert_eq!(poses[5..].iter().any(Option::is_none), is_lost, "{doubted_box_trust}: {poses:?}");
         let off_m = poses.iter().flatten().map(|pose| pose.translation.vector.norm()).fold(0.0, f64::max);
-        assert!(off_m < 0.02, "{doubted_trust}: {off_m}");
+        assert!(off_m < 0.02, "{doubted_box_trust}: {off_m}");
         // The landmarks of the wall show that the box is false; it is then ignored.
         let features = &slam.features();
         let mut on_wall = features.iter().filter(|f| f.raw[0] < 460.0);

@@ -1,110 +1,72 @@
-//! Every constant of dense maps, with its meaning, unit and source.
+//! Keys of dense maps.
 
-use serde::{Deserialize, Serialize};
-
-use super::{ConfigError, FieldDocs, config_section};
+use super::section::config_section;
 
 config_section! {
     /// Dense maps (`yfslam run --dense`, `yfslam map`).
     DenseConfig {
-        /// Side of a voxel, m, from 0.01 to 0.2. Source: DS-SLAM.
-        resolution_m: f32 = 0.05,
-        /// Depth beyond which the sensor's readings make no surface, m; up to there space is free before them. DS-SLAM has
-        /// 5; beyond 4 a structured-light camera's steps are as large as a voxel (Khoshelham and Elberink, Sensors 2012).
-        max_range_m: f32 = 4.0,
-        /// Pixels along each side of a cell of a patch. At 2 a keyframe takes 0.4 MB of memory.
-        stride_px: usize = 2,
-        /// A keyframe becomes a patch if since the last one the camera has moved this far, m,
-        min_move_m: f64 = 0.25,
-        /// or turned this far, degrees,
-        min_turn_deg: f64 = 10.0,
-        /// or this time has passed, s: views that show the same cost memory and tell little.
-        min_gap_s: f64 = 0.5,
-        /// Distance from what moves within which depth is not believed, px: edges of structured-light depth are off by some.
-        edge_px: f32 = 8.0,
-        /// Difference of depth within three by three cells that makes an edge, m: this,
-        edge_step_m: f32 = 0.03,
-        /// and this share of the depth.
-        edge_step_share: f32 = 0.05,
-        /// Half the side of the window over which depth is averaged, px for each metre of depth: noise grows with distance.
-        smooth_px_per_m: f32 = 1.5,
-        /// Difference of depth, as a share of its square, 1/m, up to which it is noise and is averaged: three times that of a Kinect
-        /// (Nguyen et al., 3DIMPVT 2012).
-        smooth_noise_per_m: f32 = 0.006,
-        /// Probability that a voxel in which a reading ends is occupied. Source: OctoMap (Hornung et al., Autonomous Robots 2013).
-        hit: f32 = 0.7,
-        /// The same for one that a reading passes. Source: OctoMap.
-        miss: f32 = 0.4,
-        /// Least probability that is kept, so that static_objects that arrive are noticed. Source: OctoMap.
-        clamp_min: f32 = 0.12,
-        /// Greatest probability that is kept, so that static_objects that leave are noticed. Source: OctoMap.
-        clamp_max: f32 = 0.97,
-        /// Probability from which a voxel is occupied. Source: OctoMap.
-        occupied: f32 = 0.5,
-        /// Part of a voxel by which a patch's surfaces may be off, after a correction of the map, before they are entered anew.
-        follow_voxels: f32 = 0.5,
-        /// Memory that the map of `yfslam map` may take, MB (10⁶ bytes), and each of its products beside it: where it would be more, an error
-        /// says which resolution fits.
-        max_memory_mb: usize = 4000,
-        /// Whether patches keep the classes of static_objects, if a detector finds any that cannot move. Costs a fifth more memory then. Source:
-        /// DS-SLAM's semantic octree.
-        classes: bool = true,
-        /// Neighbours, of 26, that a voxel needs in clouds: those with fewer are outliers.
-        min_neighbours: usize = 4,
-        /// Distance from the surface over which the mesh's distance field is kept, voxels.
-        truncation_voxels: f32 = 3.0,
-    }
-}
-
-impl DenseConfig {
-    /// Checks the values with which nothing can work.
-    ///
-    /// # Errors
-    /// For the first such value.
-    pub fn validate(&self) -> Result<(), ConfigError> {
-        let probability = |p: f32| p > 0.0 && p < 1.0;
-        let checks: [(&'static str, String, bool, &'static str); 12] = [
-            (
-                "dense.resolution_m",
-                self.resolution_m.to_string(),
-                (0.01..=0.2).contains(&self.resolution_m),
-                "from 0.01 to 0.2 m",
-            ),
-            (
-                "dense.max_range_m",
-                self.max_range_m.to_string(),
-                self.max_range_m > self.resolution_m && self.max_range_m <= 15.0,
-                "longer than a voxel, at most 15 m",
-            ),
-            ("dense.stride_px", self.stride_px.to_string(), (1..=16).contains(&self.stride_px), "from 1 to 16 px"),
-            ("dense.edge_px", self.edge_px.to_string(), (0.0..=100.0).contains(&self.edge_px), "from 0 to 100 px"),
-            ("dense.hit", self.hit.to_string(), self.hit > 0.5 && self.hit < 1.0, "above 0.5, below 1"),
-            ("dense.miss", self.miss.to_string(), self.miss > 0.0 && self.miss < 0.5, "above 0, below 0.5"),
-            (
-                "dense.clamp_min",
-                self.clamp_min.to_string(),
-                self.clamp_min > 0.0 && self.clamp_min < self.occupied,
-                "above 0, below `occupied`",
-            ),
-            (
-                "dense.clamp_max",
-                self.clamp_max.to_string(),
-                self.clamp_max > self.occupied && self.clamp_max < 1.0,
-                "above `occupied`, below 1",
-            ),
-            ("dense.occupied", self.occupied.to_string(), probability(self.occupied), "above 0, below 1"),
-            ("dense.max_memory_mb", self.max_memory_mb.to_string(), self.max_memory_mb > 0, "1 MB or more"),
-            ("dense.follow_voxels", self.follow_voxels.to_string(), self.follow_voxels >= 0.0, "0 or more voxels"),
-            (
-                "dense.truncation_voxels",
-                self.truncation_voxels.to_string(),
-                (1.5..=16.0).contains(&self.truncation_voxels),
-                "from 1.5 to 16 voxels",
-            ),
-        ];
-        match checks.into_iter().find(|(.., holds, _)| !holds) {
-            Some((key, value, _, must)) => Err(ConfigError { key, value, must }),
-            None => Ok(()),
-        }
+        /// The side of a voxel.
+        /// Source: DS-SLAM.
+        resolution_m: f32 = 0.05, in 0.01..=0.2, "m", basic;
+        /// The depth up to which readings are surfaces and make the space before them free; farther readings only free that space.
+        /// Source: chosen: DS-SLAM has 5; beyond 4 the depth steps of structured light exceed a voxel (Khoshelham and Elberink, Sensors 2012).
+        max_range_m: f32 = 4.0, in 0.25..=15.0, "m", basic;
+        /// The side of a cell of a keyframe patch.
+        /// Source: chosen: at 2, a keyframe of 640 × 480 px takes 0.4 MB of memory.
+        stride_px: usize = 2, in 1..=16, "px";
+        /// The distance from the last keyframe patch at which a keyframe becomes a patch.
+        /// Source: chosen: nearer views add little.
+        min_move_m: f64 = 0.25, in 0.0..=1000.0, "m";
+        /// The angle to the last keyframe patch at which a keyframe becomes a patch.
+        /// Source: chosen: nearer views add little.
+        min_turn_deg: f64 = 10.0, in 0.0..=180.0, "degrees";
+        /// The time since the last keyframe patch at which a keyframe becomes a patch.
+        /// Source: chosen: objects may have moved since.
+        min_gap_s: f64 = 0.5, in 0.0..=1_000_000.0, "s";
+        /// The distance from moving objects within which depth is not used.
+        /// Source: chosen: edges in structured-light depth are inexact.
+        edge_px: f32 = 8.0, in 0.0..=100.0, "px";
+        /// The depth difference within 3 × 3 cells that makes an edge, to which `edge_step_share` of the depth is added.
+        /// Source: chosen: sensors blur depth edges.
+        edge_step_m: f32 = 0.03, in 0.0..=10.0, "m";
+        /// The share of the depth that is added to `edge_step_m`.
+        /// Source: chosen: noise grows with distance.
+        edge_step_share: f32 = 0.05, in 0.0..=1.0;
+        /// Half the side of the window over which depth is averaged, for each metre of depth.
+        /// Source: chosen: noise grows with distance.
+        smooth_px_per_m: f32 = 1.5, in 0.0..=20.0, "px/m";
+        /// The coefficient of the square of the depth up to which a depth difference counts as noise and is averaged.
+        /// Source: three times the noise of a Kinect (Nguyen et al., 3DIMPVT 2012).
+        smooth_noise_per_m: f32 = 0.006, in 0.0..=1.0, "1/m";
+        /// The probability that a voxel in which a reading ends is occupied.
+        /// Source: OctoMap (Hornung et al., Autonomous Robots 2013).
+        p_hit: f32 = 0.7, in 0.51..=0.999;
+        /// The probability that a voxel through which a reading passes is occupied.
+        /// Source: OctoMap.
+        p_miss: f32 = 0.4, in 0.001..=0.49;
+        /// The smallest probability that a voxel keeps, so that objects that appear are noticed; it must be below `occupied`.
+        /// Source: OctoMap.
+        clamp_min: f32 = 0.12, in 0.001..=0.49;
+        /// The largest probability that a voxel keeps, so that objects that disappear are noticed; it must be above `occupied`.
+        /// Source: OctoMap.
+        clamp_max: f32 = 0.97, in 0.51..=0.999;
+        /// The probability above which a voxel counts as occupied.
+        /// Source: OctoMap.
+        occupied: f32 = 0.5, in 0.15..=0.95;
+        /// The part of a voxel by which a correction of the map may displace a keyframe patch before it is inserted again.
+        /// Source: chosen: smaller displacements hardly change voxels.
+        refit_threshold_voxels: f32 = 0.5, in 0.0..=1000.0, "voxels";
+        /// The memory, in units of 10⁶ bytes, that the map of `yfslam map` and each of its products may take.
+        /// Source: chosen: half of the memory of a board with 8 GB.
+        max_memory_mb: usize = 4000, in 1..=1_000_000, "MB", basic;
+        /// Whether keyframe patches keep the classes of static objects, which takes a fifth more memory where the detector has such classes.
+        /// Source: the semantic octree of DS-SLAM.
+        classes: bool = true, any, basic;
+        /// The number of occupied neighbours, of 26, below which a voxel counts as an outlier.
+        /// Source: chosen: surfaces have more, noise has fewer.
+        min_neighbours: usize = 4, in 0..=26, "voxels";
+        /// The distance from surfaces up to which the signed distance field of the mesh is kept.
+        /// Source: chosen: usual for truncated signed distance fields.
+        truncation_voxels: f32 = 3.0, in 1.5..=16.0, "voxels";
     }
 }

@@ -1,8 +1,8 @@
-//! The names of the dynamic filters, and how depth groups are found.
+//! The names of the dynamic filters and of the searches for depth groups.
 
 use serde::{Deserialize, Serialize};
 
-/// The dynamic filter: which features are kept out of tracking and mapping.
+/// The dynamic filter, which keeps dynamic features out of tracking and mapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
@@ -16,13 +16,13 @@ pub enum Method {
     /// DS-SLAM: people are dropped while a feature on them violates the epipolar geometry.
     #[serde(rename = "ds")]
     DsSlam,
-    /// DynaSLAM: people are dropped, and what is nearer than earlier keyframes allow.
+    /// DynaSLAM: people are dropped, and features that are nearer than the depth predicted by earlier keyframes.
     #[serde(rename = "dyna")]
     DynaSlam,
     /// DMS-SLAM: features whose motion differs from that of their neighbours are dropped; it uses no detector.
     #[serde(rename = "dms")]
     DmsSlam,
-    /// Our method: people are segmented in depth, and everything that has moved since the last seconds is dropped.
+    /// The method of this project: people are segmented in the depth image, and objects that have moved in the last seconds are dropped.
     #[default]
     Full,
 }
@@ -34,7 +34,7 @@ impl Method {
     }
 }
 
-/// How the largest depth group in a box is found.
+/// The search for the largest depth group in a bounding box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Grouping {

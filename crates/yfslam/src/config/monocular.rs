@@ -1,75 +1,77 @@
-//! Every constant of a single camera, with its meaning, unit and source.
+//! Keys of a single camera without depth.
 
-use serde::{Deserialize, Serialize};
-
-use super::{Config, DepthSource, FieldDocs, config_section};
+use super::MAX_SEED;
+use super::section::config_section;
 
 config_section! {
-    /// A single camera without depth (`--sensor mono`). Its unit of length is arbitrary: the median depth of the first landmarks is 1.
-    /// (ORB-SLAM, IEEE T-RO 2015, section IV for the start, V to VII for the rest.)
+    /// A single camera without depth (`--sensor mono`); the unit of length is the median depth of the first landmarks.
+    /// Initialisation follows ORB-SLAM, IEEE T-RO 2015, section IV; the remaining keys follow its sections V to VII.
     MonocularConfig {
-        /// Features asked for until the map has more than `tracking.reset_max_keyframes` keyframes, as a multiple of `features.count`: it
-        /// begins with those of the finest level alone. ORB-SLAM has 2.
-        start_features: f64 = 3.0,
-        /// Matches between two frames below which the start begins anew with the later one. Source: ORB-SLAM.
-        start_min_matches: usize = 100,
-        /// Distance within which a feature of the first frame is sought around where it was seen last, px. Source: ORB-SLAM.
-        start_radius_px: f32 = 100.0,
-        /// Ratio of best to second-best distance of a match between the two.
-        start_ratio: f32 = 0.9,
-        /// Samples of eight matches that are drawn: with three of ten matches wrong, eleven of them hold right ones alone.
-        start_draws: usize = 200,
-        /// Share of the homography in the sum of both scores above which the scene counts as a plane. Source: ORB-SLAM.
-        plane_share: f64 = 0.45,
-        /// Angle between two rays to a point that fixes its depth, degrees: nine times the noise of a corner.
-        start_min_parallax_deg: f64 = 1.0,
-        /// Points with such parallax for which it is worth to adjust two frames; a map begins with `tracking.init_min_landmarks`.
-        start_min_points: usize = 50,
-        /// Of the matches that fit a homography or a fundamental matrix the share that must fit its best motion, too: before both cameras
-        /// and where they were seen.
-        start_min_share: f64 = 0.9,
-        /// Share of these points that any other motion may explain: a plane often leaves two.
-        start_max_rival: f64 = 0.7,
-        /// Standard deviation of the direction of the motion between the two frames, degrees, above which a start waits for a wider baseline.
-        start_max_sigma_deg: f64 = 3.0,
-        /// Steps of the adjustment of the two frames. Source: ORB-SLAM2.
-        start_iterations: usize = 20,
-        /// Stands in the place of `keyframes.reference_ratio`. Source: ORB-SLAM.
-        reference_ratio: f64 = 0.9,
-        /// Stands in the place of `keyframes.min_observation_weight`: a new landmark is seen from two keyframes, each of which weighs 1.
-        reference_observation_weight: usize = 2,
-        /// Stands in the place of `keyframes.min_frames`: points that two views fix badly want more of them soon.
-        min_frames: u64 = 3,
-        /// Stands in the place of `tracking.local_radius_factor`. Source: ORB-SLAM.
-        local_radius_factor: f32 = 1.0,
-        /// Stands in the place of `mapping.triangulation_neighbours`. Source: ORB-SLAM2.
-        triangulation_neighbours: usize = 20,
-        /// Stands in the place of `mapping.min_observation_weight`: a matched without depth weighs 1. Source: ORB-SLAM2.
-        min_observation_weight: usize = 3,
-        /// Distance between two keyframes, as a share of the median depth in the older one, below which nothing is triangulated between
-        /// them. Source: ORB-SLAM.
-        min_baseline_share: f64 = 0.01,
-        /// Stands in the place of `tracking.reset_after_s` for a submap of at most `tracking.reset_max_keyframes`, s.
-        reset_after_s: f64 = 0.5,
-        /// Landmarks of a keyframe and of an old place that must agree on the similarity between them. Source: ORB-SLAM2.
-        loop_min_pairs: usize = 20,
-        /// Seed of the random draws.
-        seed: u64 = 0,
-    }
-}
-
-impl Config {
-    /// The configuration as the stages use it: without depth, what section `monocular` says in the place of other keys.
-    pub fn for_sensor(mut self) -> Self {
-        if self.depth.source == DepthSource::Motion {
-            let m = &self.monocular;
-            self.keyframes.reference_ratio = m.reference_ratio;
-            self.keyframes.min_observation_weight = m.reference_observation_weight;
-            self.keyframes.min_frames = m.min_frames;
-            self.tracking.local_radius_factor = m.local_radius_factor;
-            self.mapping.triangulation_neighbours = m.triangulation_neighbours;
-            self.mapping.min_observation_weight = m.min_observation_weight;
-        }
-        self
+        /// The factor on `features.count` until the submap has more than `tracking.reset_max_keyframes` keyframes.
+        /// Source: chosen: initialisation uses the finest level alone; ORB-SLAM has 2.
+        init_feature_factor: f64 = 3.0, in 1.0..=10.0;
+        /// The number of matches between two frames below which initialisation starts again with the later frame.
+        /// Source: ORB-SLAM, section IV.
+        init_min_matches: usize = 100, in 8..=100_000, "matches";
+        /// The search radius around the last position of a feature of the first frame.
+        /// Source: ORB-SLAM2.
+        init_radius_px: f32 = 100.0, in 0.1..=10_000.0, "px";
+        /// The largest ratio of the best to the second-best Hamming distance of a match between the two frames.
+        /// Source: ORB-SLAM2.
+        init_ratio: f32 = 0.9, in 0.0..=1.0;
+        /// The number of RANSAC iterations, each with eight matches.
+        /// Source: chosen: with three of ten matches wrong, eleven samples have correct matches only.
+        init_ransac_iterations: usize = 200, in 1..=10_000, "iterations";
+        /// The share of the homography in the sum of both scores above which the scene counts as a plane.
+        /// Source: ORB-SLAM, section IV.
+        plane_share: f64 = 0.45, in 0.0..=1.0;
+        /// The smallest parallax at which a point counts as triangulated.
+        /// Source: chosen: nine times the noise of a feature.
+        init_min_parallax_deg: f64 = 1.0, in 0.0..=90.0, "degrees";
+        /// The number of points with sufficient parallax from which on two frames are adjusted.
+        /// Source: ORB-SLAM2.
+        init_min_points: usize = 50, in 3..=100_000, "points";
+        /// The share of the inliers of the homography or fundamental matrix that the best motion must explain.
+        /// Source: ORB-SLAM2.
+        init_min_inlier_share: f64 = 0.9, in 0.0..=1.0;
+        /// The largest number of points that any other motion explains, as a share of those that the best motion explains.
+        /// Source: chosen: a plane often has two solutions.
+        init_max_rival_share: f64 = 0.7, in 0.0..=1.0;
+        /// The standard deviation of the direction of motion between the two frames above which initialisation waits for a wider baseline.
+        /// Source: chosen: a wider baseline gives a more certain direction.
+        init_max_sigma_deg: f64 = 3.0, in 0.0..=180.0, "degrees";
+        /// The number of bundle-adjustment steps for the two frames.
+        /// Source: ORB-SLAM2.
+        init_bundle_iterations: usize = 20, in 0..=1000, "steps";
+        /// The value of `keyframes.reference_ratio` for a single camera.
+        /// Source: ORB-SLAM, section V-E.
+        reference_ratio: f64 = 0.9, in 0.0..=1.0;
+        /// The value of `keyframes.min_observation_weight` for a single camera, whose observations weigh 1 each.
+        /// Source: chosen: a new landmark is observed by two keyframes.
+        reference_observation_weight: usize = 2, in 0..=1000;
+        /// The value of `keyframes.min_frames` for a single camera.
+        /// Source: chosen: points from two views soon need further views.
+        min_frames: u64 = 3, in 0..=100_000, "frames";
+        /// The value of `tracking.local_radius_factor` for a single camera.
+        /// Source: ORB-SLAM2.
+        local_radius_factor: f32 = 1.0, in 0.1..=100.0;
+        /// The value of `mapping.triangulation_neighbours` for a single camera.
+        /// Source: ORB-SLAM2.
+        triangulation_neighbours: usize = 20, in 0..=1000, "keyframes";
+        /// The value of `mapping.min_observation_weight` for a single camera, whose observations weigh 1 each.
+        /// Source: ORB-SLAM2.
+        min_observation_weight: usize = 3, in 0..=1000;
+        /// The baseline of two keyframes, as a share of the median depth in the older one, below which they are not triangulated.
+        /// Source: ORB-SLAM2.
+        min_baseline_share: f64 = 0.01, in 0.0..=10.0;
+        /// The value of `tracking.reset_after_s` for a submap of a single camera that has at most `tracking.reset_max_keyframes` keyframes.
+        /// Source: chosen: a young submap is soon replaced.
+        reset_after_s: f64 = 0.5, in 0.0..=1_000_000.0, "s";
+        /// The number of landmarks of a keyframe and of an old place that must agree on the similarity between them.
+        /// Source: ORB-SLAM2.
+        loop_min_pairs: usize = 20, in 3..=100_000, "landmarks";
+        /// The seed of the random draws.
+        /// Source: chosen: any number will do.
+        seed: u64 = 0, in 0..=MAX_SEED;
     }
 }

@@ -23,8 +23,8 @@ impl Steps {
     pub(super) fn new(config: &DenseConfig) -> Self {
         let log_odds = |p: f32| ((p / (1.0 - p)).ln() * PER_UNIT).round() as i16;
         Self {
-            hit: log_odds(config.hit),
-            miss: log_odds(config.miss),
+            hit: log_odds(config.p_hit),
+            miss: log_odds(config.p_miss),
             min: log_odds(config.clamp_min),
             max: log_odds(config.clamp_max),
             occupied: log_odds(config.occupied),

@@ -80,11 +80,11 @@ impl Classes {
         let current =
             &mut self.blocks.entry(block).or_insert_with(|| vec![VoxelClass::default(); VOXELS])[index_in_block(voxel)];
         if current.class == 0 {
-            *current = VoxelClass { class, log_odds: if class > 0 { log_odds(config.hit) } else { 0.0 } };
+            *current = VoxelClass { class, log_odds: if class > 0 { log_odds(config.p_hit) } else { 0.0 } };
         } else if current.class == class {
-            current.log_odds = (current.log_odds + log_odds(config.hit)).min(log_odds(config.clamp_max));
+            current.log_odds = (current.log_odds + log_odds(config.p_hit)).min(log_odds(config.clamp_max));
         } else {
-            current.log_odds += log_odds(config.miss);
+            current.log_odds += log_odds(config.p_miss);
             if current.log_odds <= 0.0 {
                 *current = VoxelClass::default();
             }

@@ -29,7 +29,7 @@ impl ObjectMasks {
         let mut certain: Vec<Detection> = boxes.iter().filter(|one| one.score >= config.open_score).copied().collect();
         // An object on a table is in the table's box too: the smaller box comes first.
         certain.sort_by(|a, b| a.bbox.area().total_cmp(&b.bbox.area()));
-        let without_margin = DynamicConfig { margin: 0.0, reach_m: 0.0, ..config.clone() };
+        let without_margin = DynamicConfig { box_margin_share: 0.0, limb_reach_m: 0.0, ..config.clone() };
         let (mut clusters, mut instances) = (DepthClusters::new(config.seed), InstanceMask::default());
         instances.begin_frame(depth);
         instances.mark_where(|x, y| moving.covers(depth, [x as f32, y as f32], 0.0));

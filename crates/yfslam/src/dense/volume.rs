@@ -55,7 +55,7 @@ impl Volume {
         &self.config
     }
 
-    /// Integrates patch `number` at a pose, or moves it if its surfaces may be off by more than `follow_voxels`; `None` removes it.
+    /// Integrates patch `number` at a pose, or moves it if its surfaces may be off by more than `refit_threshold_voxels`; `None` removes it.
     /// Returns whether anything changed.
     pub(crate) fn integrate(
         &mut self,
@@ -77,12 +77,12 @@ impl Volume {
         true
     }
 
-    /// Returns whether a point within range may have moved by more than `follow_voxels`.
+    /// Returns whether a point within range may have moved by more than `refit_threshold_voxels`.
     fn has_moved(&self, before: &Isometry3<f64>, now: &Isometry3<f64>) -> bool {
         let moved = before.inverse() * now;
         let turned = moved.rotation.angle() * f64::from(self.config.max_range_m);
         let Translation3 { vector, .. } = moved.translation;
-        vector.norm() + turned > f64::from(self.config.follow_voxels * self.config.resolution_m)
+        vector.norm() + turned > f64::from(self.config.refit_threshold_voxels * self.config.resolution_m)
     }
 
     /// Adds the observations of a patch to its blocks.

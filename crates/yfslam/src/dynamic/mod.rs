@@ -86,7 +86,7 @@ pub trait DynamicFilter: Send + Sync {
         false
     }
 
-    /// Gives the trust `dynamic.full.doubted_trust` to features that only a bounding box excludes. Called when too few trusted
+    /// Gives the trust `dynamic.full.doubted_box_trust` to features that only a bounding box excludes. Called when too few trusted
     /// features remain to track the frame; it is then tracked again. Returns whether the trust of any feature has changed.
     fn doubt_boxes(&mut self, _config: &DynamicConfig, _features: &mut FrameFeatures) -> bool {
         false

@@ -93,7 +93,7 @@ impl Track {
         self.depth_age = 0;
         let [x, y] = center(&self.bbox);
         let offset = [extent.middle[0] - x, extent.middle[1] - y];
-        let is_whole = extent.cells as f32 >= config.full.whole_share * self.extent.cells as f32;
+        let is_whole = extent.cells as f32 >= config.full.full_visibility_share * self.extent.cells as f32;
         if self.misses == 0 {
             self.extent = Extent { middle: offset, cells: extent.cells };
         } else if is_whole {

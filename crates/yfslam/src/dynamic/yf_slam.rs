@@ -48,11 +48,11 @@ impl YfSlam {
             };
             track.depth_m = Some(center_m);
             regions.push(Region {
-                bbox: grow(&track.bbox, config.margin),
+                bbox: grow(&track.bbox, config.box_margin_share),
                 score: track.score,
                 misses: track.misses,
                 depth_m: Some([
-                    center_m - config.group_half_width_m - config.reach_m,
+                    center_m - config.group_half_width_m - config.limb_reach_m,
                     center_m + config.group_half_width_m,
                 ]),
             });

@@ -41,7 +41,7 @@ impl StereoWorker {
         };
         Ok(Self {
             matcher: StereoMatcher::new(config, bf, fx),
-            right_features: config.right_features,
+            right_features: config.right_feature_factor,
             worker: Worker::spawn("stereo", 1, |_| extract)?,
             view: Some(Box::new(StereoView::new(features))),
         })

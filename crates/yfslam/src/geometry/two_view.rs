@@ -103,11 +103,11 @@ pub(crate) fn reconstruct(
     let Some(Hypothesis { motion, points, inliers, with_parallax }) = hypotheses.into_iter().next() else {
         return Err(ReconstructionError::NoModel);
     };
-    if (inliers as f64) < config.start_min_share * of as f64 {
+    if (inliers as f64) < config.init_min_inlier_share * of as f64 {
         Err(ReconstructionError::TooFewInliers { inliers, of })
-    } else if second as f64 > config.start_max_rival * inliers as f64 {
+    } else if second as f64 > config.init_max_rival_share * inliers as f64 {
         Err(ReconstructionError::Ambiguous { inliers, second })
-    } else if with_parallax < config.start_min_points {
+    } else if with_parallax < config.init_min_points {
         Err(ReconstructionError::LittleParallax { with_parallax })
     } else {
         Ok(TwoView { t_second_first: motion, points, model })
@@ -150,7 +150,7 @@ fn ransac(config: &MonocularConfig, variance: f64, pairs: &[Pair]) -> Models {
     }
     // The generator is seeded in each call, so that a result depends on its input only.
     let mut rng = Pcg32::new(config.seed, STREAM);
-    for _ in 0..config.start_draws {
+    for _ in 0..config.init_ransac_iterations {
         let sample: [Pair; SAMPLE_PAIRS] =
             std::array::from_fn(|_| pairs[((u64::from(rng.next_u32()) * pairs.len() as u64) >> 32) as usize]);
         models.plane.replace_if_better(homography(sample[..PLANE_PAIRS].iter().copied()), pairs, variance);
@@ -226,7 +226,7 @@ impl Hypothesis {
         pairs: &[Pair],
         model_inliers: &[Option<Pair>],
     ) -> Self {
-        let min_parallax = config.start_min_parallax_deg.to_radians();
+        let min_parallax = config.init_min_parallax_deg.to_radians();
         let t_first_second = motion.inverse();
         let projects_to = |p: Vector3<f64>, measured: &[f32; 2]| {
             let [u, v] = camera.project(&p);

@@ -81,7 +81,7 @@ pub(crate) fn relocalise(
     region: Option<&SearchRegion>,
 ) -> bool {
     let config = &context.config;
-    let c = &config.places;
+    let c = &config.place_recognition;
     let candidates = recogniser.candidates(c, map, &frame.features, |_| true);
     let needed = Support { inliers: c.relocalise_min_inliers, match_ratio: c.relocalise_min_match_ratio };
     let mut best: Option<(f64, Pose, Vec<Option<Match>>)> = None;
@@ -90,7 +90,7 @@ pub(crate) fn relocalise(
         let within = region.is_some_and(|region| region.includes(map, candidate.keyframe, &frame.t_cam_world));
         tracing::debug!(?support, within, "relocalisation candidate");
         let limit =
-            region.filter(|_| within).map_or(c.relocalise_min_match_ratio_beyond, |region| region.min_match_ratio);
+            region.filter(|_| within).map_or(c.relocalise_min_match_ratio_far, |region| region.min_match_ratio);
         if support.match_ratio < limit {
             continue;
         }
@@ -148,7 +148,7 @@ impl LoopCloser {
             let drift = estimated * s_cam_candidate.inverse();
             let plausible = drift_gate::is_plausible(c, map, keyframe, candidate.keyframe, &drift);
             tracing::debug!(?support, %drift, plausible, "loop candidate");
-            if !plausible && support.match_ratio < c.min_match_ratio_of_jump {
+            if !plausible && support.match_ratio < c.min_match_ratio_large_drift {
                 continue;
             }
             let t_keyframe_to = rigid(&s_cam_candidate) * map.keyframe(candidate.keyframe)?.t_cam_world.inverse();
@@ -217,7 +217,7 @@ fn loop_candidates(
     for (_, landmark) in near.keys().filter_map(|id| map.keyframe(id)).flat_map(|k| k.observed()) {
         local.insert(landmark, ());
     }
-    let mut candidates = recogniser.candidates(&config.places, map, &k.features, |id| !local.contains_key(id));
+    let mut candidates = recogniser.candidates(&config.place_recognition, map, &k.features, |id| !local.contains_key(id));
     candidates.retain(|candidate| !near.contains_key(candidate.keyframe));
     candidates
 }

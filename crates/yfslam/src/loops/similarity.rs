@@ -27,14 +27,14 @@ pub(super) fn measure(
     let (camera, needed) = (&sensor.pinhole, config.monocular.loop_min_pairs);
     let mut pairs = correspondences(sensor, map, keyframe, candidate, localised);
     let mut s_candidate_cam = ransac(
-        &config.places,
+        &config.place_recognition,
         pairs.len(),
         needed,
         |sample| absolute_orientation(&sample.map(|i| (pairs[i].in_a, pairs[i].in_b))),
         |s_candidate_cam, i| pairs[i].fits(camera, s_candidate_cam),
     );
     let s_candidate_cam = s_candidate_cam.as_mut()?;
-    let inliers = optimize_similarity(camera, &config.pose, s_candidate_cam, &mut pairs);
+    let inliers = optimize_similarity(camera, &config.pose_optimizer, s_candidate_cam, &mut pairs);
     tracing::debug!(
         pairs = pairs.len(),
         inliers,

@@ -45,7 +45,7 @@ pub(super) fn localise(
     needed: &Support,
 ) -> Option<Support> {
     let Context { sensor, config } = context;
-    let c = &config.places;
+    let c = &config.place_recognition;
     let pairs: Vec<Pair> = candidate.matches.iter().filter_map(|m| Pair::new(sensor, map, frame, *m)).collect();
     // Depth, where measured, selects among the solutions of P3P.
     let pose = ransac(
@@ -112,7 +112,7 @@ fn position_sigma_m(sensor: &SensorModel, frame: &TrackedFrame) -> f64 {
 fn is_occluded(config: &PlaceConfig, projector: &Projector<'_>, frame: &TrackedFrame, landmark: &Landmark) -> bool {
     let Some(projection) = projector.project(&landmark.position) else { return false };
     let mut occluded = false;
-    frame.features.for_each_near(projection.u, projection.v, config.hidden_radius_px, 0..=u8::MAX, |j| {
+    frame.features.for_each_near(projection.u, projection.v, config.occlusion_radius_px, 0..=u8::MAX, |j| {
         occluded |= frame.features.features[j].trust <= 0.0;
     });
     occluded
@@ -175,7 +175,7 @@ pub(super) fn ransac<M: Copy, I: IntoIterator<Item = M>>(
     let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
     let mut draw = || ((u64::from(rng.next_u32()) * count as u64) >> 32) as usize;
     let mut best: Option<(usize, M)> = None;
-    let mut draws = config.max_draws as f64;
+    let mut draws = config.ransac_iterations as f64;
     let mut drawn = 0;
     while f64::from(drawn) < draws {
         drawn += 1;
@@ -193,7 +193,7 @@ pub(super) fn ransac<M: Copy, I: IntoIterator<Item = M>>(
             if best.as_ref().is_none_or(|(most, _)| inliers > *most) {
                 best = Some((inliers, model));
                 let share = inliers as f64 / count as f64;
-                let needed = (1.0 - config.confidence).ln() / (1.0 - share.powi(3)).max(1e-9).ln();
+                let needed = (1.0 - config.ransac_confidence).ln() / (1.0 - share.powi(3)).max(1e-9).ln();
                 draws = draws.min(needed.ceil().max(1.0));
             }
         }

@@ -64,7 +64,7 @@ impl Slam {
     fn track_with_doubted_boxes(&mut self) -> bool {
         let config = &self.context.config;
         // The same certainty as for a camera that was lost.
-        let min_inliers = config.places.relocalise_min_inliers;
+        let min_inliers = config.place_recognition.relocalise_min_inliers;
         let filter = self.filter.as_mut();
         let tracked = filter.doubt_boxes(&config.dynamic, &mut self.tracker.current.features)
             && self.tracker.track(&self.context, self.owner.map(), filter, min_inliers).is_ok();
@@ -83,7 +83,7 @@ impl Slam {
         let map = self.owner.map();
         let found = relocalise(&mut recogniser, &self.context, map, &mut self.tracker.current, region.as_ref());
         let localised = if found {
-            let min_inliers = self.context.config.places.relocalise_min_inliers;
+            let min_inliers = self.context.config.place_recognition.relocalise_min_inliers;
             self.tracker.track_local_map(&self.context, map, min_inliers)
         } else {
             Err(LostReason::NotRecognised)
@@ -94,14 +94,14 @@ impl Slam {
 
     /// Returns where the camera can be since it was lost; `None` after too long a time, or if it never was tracked.
     fn search_region(&self) -> Option<SearchRegion> {
-        let c = &self.context.config.places;
+        let c = &self.context.config.place_recognition;
         let last = self.anchors.last()?;
         let lost_s = self.tracker.current.timestamp_ns.saturating_sub(last.timestamp_ns) as f64 * 1e-9;
         let t_cam_world = self.owner.map().absolute_pose(last.reference, &last.t_cam_reference)?;
         let center_world = t_cam_world.inverse_transform_point(&Point3::origin());
         // The longer the camera is lost, the less its last position says, until it says nothing.
-        let elapsed_share = lost_s / c.max_reach_s;
-        let gain = c.relocalise_min_match_ratio_beyond - c.relocalise_min_match_ratio;
+        let elapsed_share = lost_s / c.search_region_s;
+        let gain = c.relocalise_min_match_ratio_far - c.relocalise_min_match_ratio;
         let region = SearchRegion {
             reference: last.reference,
             center_world,

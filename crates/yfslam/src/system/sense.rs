@@ -79,7 +79,7 @@ impl Slam {
             TrackingState::NotInitialized => 0,
             _ => {
                 let expected = self.tracker.predict(self.owner.map());
-                self.gravity.roll_deg(&expected, self.context.config.dynamic.upright_roll_deg)
+                self.gravity.roll_deg(&expected, self.context.config.dynamic.roll_compensation_deg)
             }
         }
     }
@@ -160,9 +160,9 @@ impl Slam {
         let config = &self.context.config;
         let last = &self.tracker.current.features.features;
         let trusted = last.iter().filter(|f| f.trust > 0.0).count().max(1);
-        let factor = (last.len() as f64 / trusted as f64).clamp(1.0, config.dynamic.max_extra_features);
+        let factor = (last.len() as f64 / trusted as f64).clamp(1.0, config.dynamic.max_feature_factor);
         let begins = !self.context.sensor.measures_depth && self.is_young();
-        let start = if begins { config.monocular.start_features } else { 1.0 };
+        let start = if begins { config.monocular.init_feature_factor } else { 1.0 };
         (config.features.count as f64 * factor * start) as usize
     }
 }

@@ -247,12 +247,12 @@ fn match_first_frame<S: Simd>(
         }
         let [u, v] = last_positions[i];
         let mut best = BestTwo::new();
-        current.features.for_each_near(u, v, c.start_radius_px, 0..=0, |j| {
+        current.features.for_each_near(u, v, c.init_radius_px, 0..=0, |j| {
             if current.features.features[j].trust > 0.0 {
                 best.add(j, first.features.descriptors[i].distance(&current.features.descriptors[j]), 0);
             }
         });
-        if best.is_distinct(config.tracking.hamming_low, c.start_ratio)
+        if best.is_distinct(config.tracking.hamming_low, c.init_ratio)
             && nearest[best.index].is_none_or(|(distance, _)| best.distance < distance)
         {
             nearest[best.index] = Some((best.distance, i));

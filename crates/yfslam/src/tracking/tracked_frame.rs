@@ -97,7 +97,7 @@ impl TrackedFrame {
 
     /// Refines the pose from all matches and removes the outliers. Returns the number of inliers that are landmarks.
     pub(crate) fn refine_pose(&mut self, context: &Context) -> usize {
-        let (sensor, config) = (&context.sensor, &context.config.pose);
+        let (sensor, config) = (&context.sensor, &context.config.pose_optimizer);
         self.observations.clear();
         self.observed.clear();
         for (i, matched) in self.matches.iter().enumerate() {

@@ -68,7 +68,7 @@ impl TwoViewInitialiser {
             return None;
         };
         let matches = search_first_frame(config, &first.frame, current, &mut self.last_positions, &mut self.rotation);
-        if matches.len() < c.start_min_matches {
+        if matches.len() < c.init_min_matches {
             self.begin(config, current, color);
             return None;
         }
@@ -96,7 +96,7 @@ impl TwoViewInitialiser {
     /// Makes `current` the first frame if it has more static features than the number of matches needed.
     fn begin(&mut self, config: &Config, current: &TrackedFrame, color: &Arc<RgbImage>) {
         let static_features = current.features.features.iter().filter(|f| f.trust > 0.0 && f.octave == 0).count();
-        self.first = (static_features > config.monocular.start_min_matches)
+        self.first = (static_features > config.monocular.init_min_matches)
             .then(|| StartFrame { frame: current.clone(), color: Arc::clone(color) });
         self.last_positions.clear();
         self.last_positions.extend(current.features.features.iter().map(|f| [f.u, f.v]));
@@ -130,10 +130,10 @@ fn adjust(
         }
         features.push((i, j));
     }
-    problem.solve(&config.bundle, config.monocular.start_iterations, true);
+    problem.solve(&config.bundle, config.monocular.init_bundle_iterations, true);
     problem.drop_outliers();
     let sigma_deg = problem.two_view_sigma().to_degrees();
-    let min_parallax = config.monocular.start_min_parallax_deg.to_radians();
+    let min_parallax = config.monocular.init_min_parallax_deg.to_radians();
     let second_center = problem.poses[0].inverse_transform_point(&Point3::origin());
     let fits = |number: usize| {
         let point = problem.points[number];
@@ -142,7 +142,7 @@ fn adjust(
     };
     let kept: Vec<usize> = (0..features.len()).filter(|&number| fits(number)).collect();
     tracing::debug!(model = ?found.model, points = kept.len(), sigma_deg, "two frames determine motion and points");
-    if kept.len() < config.tracking.init_min_landmarks || sigma_deg > config.monocular.start_max_sigma_deg {
+    if kept.len() < config.tracking.init_min_landmarks || sigma_deg > config.monocular.init_max_sigma_deg {
         return None;
     }
     let mut depths: Vec<f64> = kept.iter().map(|&number| problem.points[number].z).collect();

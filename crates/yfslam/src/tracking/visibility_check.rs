@@ -22,7 +22,7 @@ pub(super) fn is_free_space(
     point_world: &Point3<f64>,
 ) -> bool {
     let p: Vector3<f64> = (t_cam_world * point_world).coords;
-    let min_depth_m = (1.0 + f64::from(config.through_share)) * p.z + f64::from(config.through_m);
+    let min_depth_m = (1.0 + f64::from(config.free_space_margin_share)) * p.z + f64::from(config.free_space_margin_m);
     let (x, y) = (p.x / p.z, p.y / p.z);
     let [u, v] = sensor.camera.distort(x, y);
     let offsets = [[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]];

@@ -51,7 +51,7 @@ impl DepthHistory {
     /// Returns whether a frame at this time is to be inserted.
     pub(super) fn is_due(&self, config: &FullConfig, timestamp_ns: i64) -> bool {
         let since_s = |entry: &Entry| timestamp_ns.saturating_sub(entry.timestamp_ns) as f64 * 1e-9;
-        self.entries.back().is_none_or(|entry| since_s(entry) >= config.view_spacing_s)
+        self.entries.back().is_none_or(|entry| since_s(entry) >= config.history_spacing_s)
     }
 
     /// Inserts a frame: depths of its cells, m; 0 where unknown or moving. The oldest entry is removed if there are too many.
@@ -62,7 +62,7 @@ impl DepthHistory {
         relative_pose: KeyframeRelativePose,
         depth_m: &[f32],
     ) {
-        let oldest = if self.entries.len() >= config.views { self.entries.pop_front() } else { None };
+        let oldest = if self.entries.len() >= config.history_frames { self.entries.pop_front() } else { None };
         let mut buffer = oldest.map(|entry| entry.depth_m).or_else(|| self.spare.pop()).unwrap_or_default();
         buffer.clear();
         buffer.extend_from_slice(depth_m);
@@ -89,8 +89,8 @@ impl DepthHistory {
             let (reference, t_entry_reference) = entry.relative_pose;
             let Some(t_reference_world) = map.keyframe_pose(reference) else { continue };
             let t_cam_entry = t_cam_world * (t_entry_reference * t_reference_world).inverse();
-            if t_cam_entry.translation.vector.norm() > config.view_max_distance_m
-                || t_cam_entry.rotation.angle() > config.view_max_angle_deg.to_radians()
+            if t_cam_entry.translation.vector.norm() > config.history_max_distance_m
+                || t_cam_entry.rotation.angle() > config.history_max_angle_deg.to_radians()
             {
                 continue;
             }
@@ -118,10 +118,10 @@ impl DepthHistory {
                 self.rays.push([x as f32, y as f32]);
             }
         }
-        let missing = config.views.saturating_sub(self.entries.len() + self.spare.len());
+        let missing = config.history_frames.saturating_sub(self.entries.len() + self.spare.len());
         self.entries.reserve(missing);
         self.component.reserve(self.rays.len());
-        self.spare.reserve(config.views);
+        self.spare.reserve(config.history_frames);
         self.spare.extend((0..missing).map(|_| Vec::with_capacity(self.rays.len())));
     }
 
@@ -164,7 +164,7 @@ impl DepthHistory {
                 if z <= 0.0 {
                     continue;
                 }
-                let tolerance = config.view_tolerance_m + config.view_tolerance_share * z;
+                let tolerance = config.history_tolerance_m + config.history_tolerance_share * z;
                 let (mut known, mut least, mut error) = (0, f32::INFINITY, f32::INFINITY);
                 for r in row - 1..=row + 1 {
                     for &p in &self.predicted_m[r * self.columns + column - 1..=r * self.columns + column + 1] {
@@ -206,14 +206,14 @@ impl DepthHistory {
                 for neighbour in [cell.wrapping_sub(columns), cell + columns, cell.wrapping_sub(1), cell + 1] {
                     if neighbour < depth_m.len()
                         && self.is_moving(neighbour, depth_m)
-                        && (depth_m[neighbour] - depth_m[cell]).abs() <= config.view_thing_step_m
+                        && (depth_m[neighbour] - depth_m[cell]).abs() <= config.history_cluster_step_m
                     {
                         self.nearer[neighbour] = 0;
                         self.component.push(neighbour as u32);
                     }
                 }
             }
-            if self.component.len() >= config.view_min_cells {
+            if self.component.len() >= config.history_min_cells {
                 for &cell in &self.component {
                     moving(cell as usize % columns, cell as usize / columns);
                 }

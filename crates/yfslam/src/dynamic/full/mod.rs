@@ -89,7 +89,7 @@ impl Full {
             }
         }
         for (t, (track, [unchanged, changed])) in self.tracks.list.iter_mut().zip(&self.counters).enumerate() {
-            if track.misses > 0 && *unchanged as usize >= config.full.view_min_cells && unchanged > changed {
+            if track.misses > 0 && *unchanged as usize >= config.full.history_min_cells && unchanged > changed {
                 track.ended = true;
                 self.segmenter.instances.clear_track(t);
                 self.unmapped.clear_track(t);
@@ -163,7 +163,7 @@ impl DynamicFilter for Full {
         let mut any = false;
         for f in features.features.iter_mut().filter(|f| f.trust == 0.0 && !self.segmenter.instances.covers(f.raw, 0.0))
         {
-            f.trust = config.full.doubted_trust;
+            f.trust = config.full.doubted_box_trust;
             any = true;
         }
         any

@@ -157,7 +157,7 @@ impl DepthClusters {
 
     /// Returns whether a group of pixel depths is a large enough share of the box.
     fn is_large_enough(&self, config: &DynamicConfig, group: &DepthGroup) -> bool {
-        group.members as f32 >= config.body_min_share * self.pixel_depths.len() as f32
+        group.members as f32 >= config.group_min_share * self.pixel_depths.len() as f32
     }
 
     /// Returns the median depth of the pixels of a group, m.

@@ -123,7 +123,7 @@ impl Segmenter {
             return;
         }
         let in_front_m = track.depth_m.unwrap_or(0.0) - config.group_half_width_m;
-        track.ended = self.instances.share_nearer(&track.bbox, in_front_m) < config.full.hidden_share;
+        track.ended = self.instances.share_nearer(&track.bbox, in_front_m) < config.full.occlusion_share;
         if let Some(in_front) = track.occlude(instead_m) {
             self.pending.push(tracks.list.len());
             tracks.list.push(in_front);

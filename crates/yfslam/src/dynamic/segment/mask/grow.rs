@@ -9,7 +9,7 @@ use crate::dynamic::segment::mask::{CELL_PX, Extent, InstanceMask, Reached, UNTR
 impl InstanceMask {
     /// Segments the instance of a track at depth `center_m` by region growing: from the unlabelled cells of the box near that
     /// depth, along the surface as long as depth changes without a step, also over gaps without depth, within the box grown by
-    /// `config.margin`. Cells of gaps are labelled inside the box only. Returns centre and size of the instance.
+    /// `config.box_margin_share`. Cells of gaps are labelled inside the box only. Returns centre and size of the instance.
     ///
     /// DynaSLAM (IEEE RA-L 2018, section III-C) grows regions in depth likewise, from key points.
     pub(crate) fn segment(
@@ -20,9 +20,9 @@ impl InstanceMask {
         center_m: f32,
     ) -> Extent {
         let label = label_of(track);
-        let (inner, outer) = (self.cell_range(bbox, 0.0), self.cell_range(bbox, config.margin));
+        let (inner, outer) = (self.cell_range(bbox, 0.0), self.cell_range(bbox, config.box_margin_share));
         let [near, far] = [center_m - config.group_half_width_m, center_m + config.group_half_width_m];
-        let [nearest, farthest] = [near - config.reach_m, far + config.reach_m];
+        let [nearest, farthest] = [near - config.limb_reach_m, far + config.limb_reach_m];
         self.segment.clear();
         for row in inner[1]..inner[3] {
             for column in inner[0]..inner[2] {

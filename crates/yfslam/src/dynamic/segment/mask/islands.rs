@@ -21,8 +21,8 @@ impl InstanceMask {
         center_m: f32,
     ) {
         let label = label_of(track);
-        let (inner, outer) = (self.cell_range(bbox, 0.0), self.cell_range(bbox, config.margin));
-        let reach_m = config.group_half_width_m + config.reach_m;
+        let (inner, outer) = (self.cell_range(bbox, 0.0), self.cell_range(bbox, config.box_margin_share));
+        let reach_m = config.group_half_width_m + config.limb_reach_m;
         for row in inner[1]..inner[3] {
             for column in inner[0]..inner[2] {
                 let seed = row * self.columns + column;

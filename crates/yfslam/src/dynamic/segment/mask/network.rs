@@ -9,10 +9,10 @@ use crate::image::Image;
 
 impl InstanceMask {
     /// Returns the median depth of the cells in a box that the network's mask covers, m, infinite where it was not measured; `None`
-    /// if they fill less than `config.body_min_share` of the box.
+    /// if they fill less than `config.group_min_share` of the box.
     pub(crate) fn masked_depth(&mut self, config: &DynamicConfig, bbox: &BoundingBox) -> Option<f32> {
         let cells = self.collect_masked(bbox);
-        if self.segment.is_empty() || (self.segment.len() as f32) < config.body_min_share * cells as f32 {
+        if self.segment.is_empty() || (self.segment.len() as f32) < config.group_min_share * cells as f32 {
             return None;
         }
         self.segment.retain(|reached| reached.depth_m > 0.0);
