@@ -62,7 +62,8 @@ fn images_of_a_rolled_camera_are_turned_upright_for_the_detector_for_one_method_
     let world = WALKING.replace("walking_xyz", "walking_rpy").replace("frames=30", "frames=60");
     for (name, limit) in [("turned", 4.0), ("never", 180.0)] {
         fs::create_dir(root.join(name)).unwrap();
-        fs::write(root.join(name).join("roll.toml"), format!("[dynamic]\nupright_roll_deg = {limit:?}\n")).unwrap();
+        fs::write(root.join(name).join("roll.toml"), format!("[dynamic]\nroll_compensation_deg = {limit:?}\n"))
+            .unwrap();
         let args = ["run", &world, "--detector", "embedded", "--config", "roll.toml"];
         assert_same_together_and_alone(&root.join(name), &args);
     }

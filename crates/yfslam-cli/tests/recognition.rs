@@ -78,7 +78,7 @@ fn a_saved_map_is_relocalised_in_and_stays_unchanged_or_is_extended() {
     succeeds(folder.path(), &["run", DESK, "--save-map", "desk.map", "--out", "a", "-q"]);
     let before = fs::read(folder.path().join("desk.map")).unwrap();
     // Noise is enough for a landmark to seem removed.
-    let eager = "[dynamic.full]\nthrough_m = 0.001\nthrough_share = 0.0\n";
+    let eager = "[dynamic.full]\nfree_space_margin_m = 0.001\nfree_space_margin_share = 0.0\n";
     fs::write(folder.path().join("eager.toml"), eager).unwrap();
     let again = ["run", DESK, "--load-map", "desk.map", "--reverse", "-q"];
     succeeds(folder.path(), &[&again[..], &["--localise", "--config", "eager.toml", "--out", "b"]].concat());
@@ -90,7 +90,8 @@ fn a_saved_map_is_relocalised_in_and_stays_unchanged_or_is_extended() {
     assert!(localised < 1.2 * mapped.max(0.003), "{localised} m in the map, {mapped} m when it was made");
     assert_eq!(fs::read(folder.path().join("desk.map")).unwrap(), before);
     succeeds(folder.path(), &[&again[..], &["--save-map", "more.map", "--out", "c"]].concat());
-    let keyframes = |name: &str| decode(&fs::read(folder.path().join(name)).unwrap()).unwrap().map.keyframe_count();
+    let keyframes =
+        |name: &str| SavedMap::from_bytes(&fs::read(folder.path().join(name)).unwrap()).unwrap().map().keyframe_count();
     assert!(keyframes("more.map") >= keyframes("desk.map"));
 }
 
@@ -150,7 +151,7 @@ fn a_map_survives_a_hundred_killed_writers() {
         std::thread::sleep(Duration::from_micros(2_000 + 731 * (round * 17 % 100)));
         writer.kill().unwrap();
         writer.wait().unwrap();
-        assert!(fs::read(&path).unwrap() == bytes && decode(&bytes).is_ok(), "round {round}");
+        assert!(fs::read(&path).unwrap() == bytes && SavedMap::from_bytes(&bytes).is_ok(), "round {round}");
     }
     let unfinished = fs::read_dir(folder.path())
         .unwrap()

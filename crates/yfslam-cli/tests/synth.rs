@@ -44,7 +44,7 @@ fn boxes_masks_settings_and_lists_equal_those_of_the_world() {
     succeeds(folder.path(), &["synth", WORLD, "--out", "rec", "-q"]);
     let config: yfslam_synth::WorldConfig =
         toml::from_str(&fs::read_to_string(rec.join("world.toml")).unwrap()).unwrap();
-    assert_eq!(config, parse_with_camera(WORLD, yfslam_synth::default_camera()).unwrap());
+    assert_eq!(config, parse_with_camera(WORLD, yfslam_synth::default_camera(), 5000.0).unwrap());
     let world = World::new(&config).unwrap();
     let boxes: Value = serde_json::from_str(&fs::read_to_string(rec.join("boxes.json")).unwrap()).unwrap();
     assert_eq!(boxes["frames"].as_array().unwrap().len(), 16);

@@ -9,7 +9,7 @@ use std::path::Path;
 use common::{SIZE, camera, color_png, depth_png, real_data, write_sequence};
 use yfslam::Camera;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
-use yfslam_io::{FrameStream, Sequence, SequenceOptions, check_recording, detect_camera};
+use yfslam_io::{CameraSource, FrameStream, Sequence, SequenceOptions, check_recording, detect_camera};
 
 fn stream(folder: &Path) -> FrameStream {
     let sequence = Sequence::open(folder, &SequenceOptions::default()).unwrap();

@@ -21,11 +21,11 @@ const PARTS: [(&str, &str); 8] = [
         "tracks of people are carried over missed detections",
         "[dynamic]\nmax_misses = 0\n[dynamic.full]\nmax_misses = 0\n",
     ),
-    ("comparison with the depth history", "[dynamic.full]\nviews = 1\n"),
+    ("comparison with the depth history", "[dynamic.full]\nhistory_frames = 1\n"),
     ("segmentation across gaps in the depth", "[dynamic.full]\nmax_gap_cells = 0\n"),
     ("features at the edges of person masks are dropped", "[dynamic.full]\nedge_px = 0.0\n"),
-    ("visibility check of landmarks", "[dynamic.full]\nthrough_m = 100.0\n"),
-    ("boxes are doubted before the camera is lost", "[dynamic.full]\ndoubted_trust = 0.0\n"),
+    ("visibility check of landmarks", "[dynamic.full]\nfree_space_margin_m = 100.0\n"),
+    ("boxes are doubted before the camera is lost", "[dynamic.full]\ndoubted_box_trust = 0.0\n"),
     ("features return when too few are left", "[dynamic]\nmin_trusted = 0\n"),
 ];
 

@@ -262,7 +262,7 @@ impl Pipeline {
                 "no trajectory: no map could be initialised in {read} frames ({skipped} skipped); the best had {features} features. Without depth \
                  initialisation needs two frames with {} matches and sideways motion of the camera between them; move it sideways, or \
                  lower the keys start_* of section monocular in --config",
-                config.monocular.start_min_matches
+                config.monocular.init_min_matches
             );
         }
         bail!(

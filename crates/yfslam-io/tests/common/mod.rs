@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use yfslam::Camera;
+use yfslam_io::CameraSource;
 
 /// Size of the images of [`write_sequence`], px.
 pub const SIZE: (u32, u32) = (8, 6);

@@ -89,8 +89,7 @@ pub(crate) fn relocalise(
         let Some(support) = verify::localise(context, map, candidate, frame, &needed) else { continue };
         let within = region.is_some_and(|region| region.includes(map, candidate.keyframe, &frame.t_cam_world));
         tracing::debug!(?support, within, "relocalisation candidate");
-        let limit =
-            region.filter(|_| within).map_or(c.relocalise_min_match_ratio_far, |region| region.min_match_ratio);
+        let limit = region.filter(|_| within).map_or(c.relocalise_min_match_ratio_far, |region| region.min_match_ratio);
         if support.match_ratio < limit {
             continue;
         }
@@ -217,7 +216,8 @@ fn loop_candidates(
     for (_, landmark) in near.keys().filter_map(|id| map.keyframe(id)).flat_map(|k| k.observed()) {
         local.insert(landmark, ());
     }
-    let mut candidates = recogniser.candidates(&config.place_recognition, map, &k.features, |id| !local.contains_key(id));
+    let mut candidates =
+        recogniser.candidates(&config.place_recognition, map, &k.features, |id| !local.contains_key(id));
     candidates.retain(|candidate| !near.contains_key(candidate.keyframe));
     candidates
 }
