@@ -4,7 +4,7 @@
 mod common;
 
 use std::fs;
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use common::{ate_rmse, fails, report, succeeds};
 use nalgebra::{Rotation3, Vector3};
@@ -76,16 +76,14 @@ fn turned(image: &RgbImage, camera: &Camera, turn: Vector3<f64>) -> RgbImage {
 #[test]
 fn a_single_camera_that_only_turns_initialises_no_map() {
     let world = World::new(&yfslam_synth::parse("sitting_xyz?people=0&frames=1").unwrap()).unwrap();
-    let Frame { color, depth, .. } = world.frame(0).frame;
+    let color = world.frame(0).frame.color;
     let camera = &world.config().camera;
     let mut config = Config::default();
     (config.depth.source, config.dynamic.method) = (DepthSource::Motion, Method::None);
-    let mut slam = Slam::new(config, camera, None).unwrap();
+    let mut slam = Slam::builder(camera.clone()).config(config).build().unwrap();
     for k in 0..24 {
         let turn = Vector3::new(0.002, 0.006, 0.003) * f64::from(k);
-        let color = Arc::new(turned(&color, camera, turn));
-        let (depth, timestamp_ns) = (Arc::clone(&depth), i64::from(k) * 33_000_000);
-        let frame = Frame { timestamp_ns, color, depth, right: None, detections: None, mask: None };
+        let frame = Frame::mono(i64::from(k) * 33_000_000, turned(&color, camera, turn));
         assert!(slam.track(&frame).unwrap().t_world_cam.is_none(), "frame {k}");
     }
     assert_eq!(slam.map().keyframe_count(), 0);
@@ -114,14 +112,14 @@ fn rounds() -> &'static [Round; 3] {
             let mut config = Config::default();
             (config.depth.source, config.dynamic.method) = (DepthSource::Motion, Method::None);
             config.loops.enabled = with_loops;
-            (Slam::new(config, &world.config().camera, None).unwrap(), Vec::new())
+            (Slam::builder(world.config().camera.clone()).config(config).build().unwrap(), Vec::new())
         };
         let mut runs = [begin(true), begin(false), begin(true)];
         for index in 0..world.len() {
             let frame = world.frame(index).frame;
             let carried = (108..180).contains(&index);
             for (slam, loops) in &mut runs[..if carried { 2 } else { 3 }] {
-                loops.extend(slam.track(&frame).unwrap().loop_closed);
+                loops.extend(slam.track(&frame).unwrap().loop_closure);
             }
         }
         let truth = |timestamp_ns| (0..world.len()).find(|i| world.timestamp_ns(*i) == timestamp_ns).unwrap();

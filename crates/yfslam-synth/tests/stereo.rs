@@ -19,7 +19,7 @@ fn disparity_errors(spec: &str, frames: impl Iterator<Item = usize>) -> (Vec<f64
     for index in frames {
         let shot = world.frame(index);
         slam.track(&shot.frame).unwrap();
-        let features = &slam.last_frame().features.features;
+        let features = slam.features();
         all += features.len();
         for f in features {
             let Some(depth_m) = f.depth_m else { continue };
