@@ -76,7 +76,7 @@ fn bad_frames_are_values_that_name_file_and_cure_and_the_others_arrive() {
 fn the_development_recordings_decode_without_an_error() {
     for name in ["rgbd/tum_fr1_xyz_dev", "rgbd/bonn_crowd_dev"] {
         let Some(folder) = real_data(name) else { return };
-        let camera = detect_camera(&folder).unwrap().camera;
+        let camera = detect_camera(&folder).unwrap();
         let sequence = Sequence::open(&folder, &SequenceOptions::default()).unwrap();
         let mut frames = FrameStream::open(&sequence, &camera, DEFAULT_LOOK_AHEAD).unwrap();
         let count = frames.by_ref().map(|frame| frame.unwrap()).filter(|f| f.color.width() == 640).count();
