@@ -3,8 +3,8 @@
 //! In: patches and their poses, also after each correction of the map. Out: for each voxel whether it is occupied, free or unknown.
 //! Each block keeps the observations of each patch and adds them up in temporal order, clamped at every step (OctoMap, section 4).
 //! A patch whose pose changes is removed and integrated again, only the blocks concerned are added up again, and the result has the
-//! same bits as a volume built from scratch. The clamps give late observations more weight: an object that has left becomes free after a few
-//! of them.
+//! same bits as a volume built from scratch. The clamps give late observations more weight: an object that has left becomes free
+//! after a few of them.
 
 use std::collections::BTreeMap;
 

@@ -1,7 +1,7 @@
 //! A keyframe patch as a source of depth and colour for the image of another view.
 //!
-//! In: a patch, its pose relative to the view, its recovered static cells. Out: its colours at points of the view, at the exposure of the
-//! view.
+//! In: a patch, its pose relative to the view, its recovered static cells. Out: its colours at points of the view, at the exposure
+//! of the view.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 

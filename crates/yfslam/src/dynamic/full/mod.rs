@@ -222,7 +222,7 @@ mod tests {
 
     const BOX: BoundingBox = BoundingBox { x_min: 200.0, y_min: 100.0, x_max: 300.0, y_max: 400.0 };
 
-    /// A wall 2.4 m away, with or without a person close in front of it at the box.
+    /// Returns the depth image of a wall 2.4 m away, with or without a person close in front of it at the box.
     fn room(person: bool) -> DepthImage {
         let mut raw = Image::new(640, 480);
         raw.data_mut().fill(12_000u16);

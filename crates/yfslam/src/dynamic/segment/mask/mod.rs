@@ -196,7 +196,8 @@ mod tests {
         DepthImage { raw, metres_per_unit: 0.001 }
     }
 
-    /// A person: a trunk at 2 m, an arm that reaches to 1.5 m, a gap without depth beside it, a wall at 4 m.
+    /// Returns the depth, mm, of a person at a pixel: a trunk at 2 m, an arm that reaches to 1.5 m, a gap without depth beside it,
+    /// a wall at 4 m.
     fn person(x: usize, y: usize) -> u16 {
         match (x, y) {
             (100..150, 40..) => 2000,
