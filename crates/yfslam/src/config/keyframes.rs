@@ -24,7 +24,7 @@ config_section! {
         /// and any other weighs 1.
         /// Source: ORB-SLAM2.
         min_observation_weight: usize = 3, in 0..=1000;
-        /// The smallest number of frames between two keyframes, unless the second is urgent.
+        /// The smallest number of frames between two keyframes, unless the second is urgent by `urgent_ratio` or its close features.
         /// Source: chosen: the time that local mapping takes for a keyframe in ORB-SLAM2.
         min_frames: u64 = 5, in 0..=100_000, "frames";
         /// A keyframe is urgent when the frame has fewer inliers than this share of the landmarks of the reference keyframe.

@@ -29,7 +29,7 @@ config_section! {
         /// The number of covisible keyframes in which duplicates of landmarks are searched.
         /// Source: ORB-SLAM2.
         fuse_neighbours: usize = 10, in 0..=1000, "keyframes";
-        /// The number of neighbours of each of these keyframes in which duplicates of landmarks are searched too.
+        /// The number of neighbours of each covisible keyframe in which duplicates of landmarks are searched too.
         /// Source: ORB-SLAM2.
         fuse_second_neighbours: usize = 5, in 0..=1000, "keyframes";
         /// The search radius for duplicates of landmarks, in pixels of the finest level.
@@ -41,7 +41,7 @@ config_section! {
         /// The largest number of further keyframes whose observations local bundle adjustment uses while their poses stay fixed.
         /// Source: chosen: it bounds the time of local bundle adjustment.
         window_fixed: usize = 40, in 0..=2000, "keyframes";
-        /// A keyframe is removed when more than this share of its landmarks is observed by enough other keyframes.
+        /// A keyframe is removed when more than this share of its landmarks is observed by at least `redundant_views` other keyframes.
         /// Source: ORB-SLAM2, section III-E.
         redundant_share: f64 = 0.9, in 0.0..=1.0;
         /// The number of other keyframes that must observe a landmark at the same or a finer scale to make an observation redundant.

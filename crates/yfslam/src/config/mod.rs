@@ -13,6 +13,8 @@ mod method;
 mod monocular;
 mod optimize;
 mod places;
+#[cfg(test)]
+mod range_tests;
 mod section;
 #[cfg(test)]
 mod tests;

@@ -43,7 +43,7 @@ config_section! {
         /// rises to `relocalise_min_match_ratio_far` within `search_region_s`.
         /// Source: chosen: near the last pose, wrong places are unlikely.
         relocalise_min_match_ratio: f64 = 0.15, in 0.0..=1.0;
-        /// The match ratio that relocalisation needs in all other places.
+        /// The match ratio that relocalisation needs in places that the camera cannot have reached since it was lost.
         /// Source: chosen: in corridors that repeat themselves, wrong places had up to 0.34 and correct ones 0.36 to 1.2.
         relocalise_min_match_ratio_far: f64 = 0.4, in 0.0..=1.0;
         /// The largest speed that is assumed for a lost camera.
@@ -79,7 +79,7 @@ config_section! {
         /// The match ratio with the old place that a loop needs.
         /// Source: chosen: a wrong loop ruins the map.
         min_match_ratio: f64 = 0.25, in 0.0..=1.0;
-        /// The match ratio that a loop needs between submaps, or when it corrects more drift than the limits below allow.
+        /// The match ratio that a loop needs between submaps, or when it corrects more drift than the `max_drift` keys allow.
         /// Source: chosen: opposite corridors had up to 0.34, correct places up to 0.95.
         min_match_ratio_large_drift: f64 = 0.5, in 0.0..=1.0;
         /// The drift of the position that is plausible over any distance.

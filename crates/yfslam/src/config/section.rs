@@ -138,7 +138,7 @@ pub(crate) fn joined(prefix: &str, name: &str) -> String {
 /// name: type = default, in from..=to, "unit", basic;
 /// ```
 ///
-/// where `any` (every value of the type) or `section` may stand in the place of `in from..=to`, and the unit and `basic` may be left out.
+/// where `any` (every value of the type) or `section` may replace `in from..=to`, and the unit and `basic` may be left out.
 macro_rules! config_section {
     ($(#[doc = $about:literal])* $name:ident { $(
         $(#[doc = $doc:literal])*

@@ -44,7 +44,7 @@ config_section! {
         /// The search radius for local landmarks that are viewed within 3.6° of their mean direction, in pixels of the finest level.
         /// Source: ORB-SLAM2.
         local_radius_narrow_px: f32 = 2.5, in 0.1..=1000.0, "px";
-        /// The search radius for all other local landmarks, in pixels of the finest level.
+        /// The search radius for local landmarks that are viewed from more than 3.6° off their mean direction, in pixels of the finest level.
         /// Source: ORB-SLAM2.
         local_radius_px: f32 = 4.0, in 0.1..=1000.0, "px";
         /// The factor on both search radii for local landmarks when features have depth.
