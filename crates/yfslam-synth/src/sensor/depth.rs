@@ -43,7 +43,8 @@ pub fn measure(
                 }
                 let measured = disturb(z, bf, cosine, sensor, draws[0]);
                 if (sensor.min_depth_m..=sensor.max_depth_m).contains(&measured) {
-                    // Depth that exceeds sixteen bits is not measured.
+                    // Rounds half up, because `round` is a library call on older processors. Depth that exceeds sixteen bits is not
+                    // measured.
                     let value = f64::from(measured) * depth_factor + 0.5;
                     *unit = if value < 65_536.0 { value as u16 } else { 0 };
                 }
