@@ -244,7 +244,7 @@ impl SourceArgs {
             wanted == offered || wanted == DepthSource::Motion,
             "{} has no {}; leave out --sensor {} (or depth.source in --config), or use `mono`",
             self.sequence,
-            if wanted == DepthSource::Stereo { "right pictures" } else { "depth images" },
+            if wanted == DepthSource::Stereo { "right images" } else { "depth images" },
             if wanted == DepthSource::Stereo { "stereo" } else { "rgbd" }
         );
         Ok(wanted)
