@@ -7,7 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates whose folders and files right below `src` must not depend on each other in a circle.
-const CRATES: [&str; 2] = ["yfslam-cli", "yfslam-report"];
+const CRATES: [&str; 7] =
+    ["yfslam", "yfslam-detect", "yfslam-io", "yfslam-synth", "yfslam-eval", "yfslam-report", "yfslam-cli"];
 
 /// Layers of the workspace: a crate depends on crates of lower layers only. Crates that are not listed are above all of these.
 const LAYERS: [&[&str]; 4] = [
@@ -114,10 +115,19 @@ fn list_files(folder: &Path, files: &mut Vec<PathBuf>) {
         let path = entry.unwrap().path();
         if path.is_dir() {
             list_files(&path, files);
-        } else if path.extension().is_some_and(|extension| extension == "rs") && !path.ends_with("tests.rs") {
+        } else if path.extension().is_some_and(|extension| extension == "rs") && !is_test_module(folder, &path) {
             files.push(path);
         }
     }
+}
+
+/// Returns whether the folder's own module declares a file for tests only.
+fn is_test_module(folder: &Path, file: &Path) -> bool {
+    let name = file.file_stem().unwrap().to_string_lossy();
+    let parents = [folder.join("mod.rs"), folder.join("lib.rs"), folder.join("main.rs"), folder.with_extension("rs")];
+    let declarations = ["", "pub(crate) "].map(|visible| format!("#[cfg(test)]\n{visible}mod {name};"));
+    let text = parents.map(|parent| fs::read_to_string(parent).unwrap_or_default()).concat();
+    declarations.iter().any(|declaration| text.contains(declaration))
 }
 
 /// Removes comments, and items that are compiled for tests only.

@@ -5,7 +5,7 @@
 //! "The coordination of arm movements", 1985), so that velocity and acceleration are continuous everywhere; the duration of each
 //! follows from its length and the mean speed of the recording.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::config::{CameraMotion, WorldConfig};
 use crate::rng::Rng;
@@ -53,15 +53,6 @@ pub struct CameraPath {
     period: f64,
     /// Per axis (three of translation, three of rotation), three sines: amplitude, angular frequency, phase.
     shake: [[[f64; 3]; 3]; 6],
-}
-
-/// Returns the pose of a camera at `eye` directed at `target` with a level horizon.
-pub fn look_at(eye: Point3<f64>, target: Point3<f64>) -> Isometry3<f64> {
-    let forward = (target - eye).normalize();
-    let right = forward.cross(&Vector3::z()).normalize();
-    let down = forward.cross(&right);
-    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[right, down, forward]));
-    Isometry3::from_parts(Translation3::from(eye.coords), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
 impl CameraPath {
@@ -222,6 +213,8 @@ fn shake(strength: f64, sines: [(f64, f64); 3], rng: &mut Rng) -> [[[f64; 3]; 3]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::look_at::look_at;
+    use nalgebra::Point3;
 
     fn path(motion: CameraMotion, seed: u64) -> CameraPath {
         let config = WorldConfig { motion, seed, ..WorldConfig::default() };

@@ -54,6 +54,7 @@ mod camera_path;
 mod config;
 mod flicker;
 mod light;
+mod look_at;
 mod mesh;
 mod render;
 mod rng;

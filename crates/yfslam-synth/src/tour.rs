@@ -6,7 +6,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::camera_path::look_at;
+use crate::look_at::look_at;
 
 /// Pace on a circuit.
 #[derive(Clone, Copy, Debug)]

@@ -6,8 +6,8 @@ use nalgebra::Point3;
 use super::builder::{Builder, Side};
 use super::wall::Wall;
 use super::{Company, Scene, Seat};
-use crate::camera_path::look_at;
 use crate::light::{Lamp, Lights};
+use crate::look_at::look_at;
 use crate::mesh::Vec3;
 use crate::texture::material::Material;
 

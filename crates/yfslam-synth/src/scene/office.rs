@@ -7,8 +7,8 @@ use nalgebra::Point3;
 use super::builder::Builder;
 use super::furniture::{bin, bookshelf, chair, desk, lying_book, monitor, mug, plant};
 use super::{Company, Scene, Seat};
-use crate::camera_path::look_at;
 use crate::light::{Lamp, Lights};
+use crate::look_at::look_at;
 use crate::mesh::Vec3;
 use crate::texture::material::Material;
 

@@ -37,13 +37,16 @@ struct Records {
     landmarks: Vec<LandmarkRecord>,
 }
 
+/// Written in the place of the depth factor: files are then the same as those of earlier programs for cameras like those of TUM.
+const RESERVED: f64 = 5000.0;
+
 /// A camera in a format without field names, in which no field is optional.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct CameraRecord {
     size: [u32; 2],
     intrinsics: [f64; 4],
     distortion: [f64; 5],
-    /// Depth units per metre in older files; now they belong to the depth images.
+    /// The depth factor in files of earlier programs; the depth unit now belongs to the depth images.
     reserved: f64,
     fps: f64,
     bf: f64,
@@ -253,7 +256,7 @@ impl CameraRecord {
             size: [camera.width as u32, camera.height as u32],
             intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy],
             distortion: camera.distortion,
-            reserved: 1.0,
+            reserved: RESERVED,
             fps: camera.fps,
             bf: camera.bf,
         }
