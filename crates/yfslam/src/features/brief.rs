@@ -15,7 +15,7 @@ use crate::image::Plane;
 /// Number of orientations for which the rotated pattern is stored (30 in the paper).
 const BINS: usize = 128;
 
-/// Largest distance of a test point from the key point, px of the level.
+/// Largest distance of a test point from the keypoint, px of the level.
 pub(crate) const PATTERN_RADIUS: usize = 17;
 
 /// Rows of the patch.

@@ -28,7 +28,7 @@ pub(crate) const DENSE_MAP: Section = Section { magic: "yfslam dense map", versi
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ContainerError {
     /// The bytes do not begin with the expected magic words.
-    #[error("this is not a {0}: it does not begin with \"{0}\"; give a file that yfslam saved")]
+    #[error("this is no {0}: it does not begin with \"{0}\"; give a file that yfslam saved")]
     Foreign(&'static str),
     /// The format has another version.
     #[error(
