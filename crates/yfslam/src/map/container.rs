@@ -32,7 +32,7 @@ pub enum ContainerError {
     Foreign(&'static str),
     /// The format has another version.
     #[error(
-        "the {magic} has version {found} of the format, but this program reads version {version}: use the program that wrote it, or create the map again"
+        "the {magic} has version {found} of the format, but this program reads version {version}: use the program that wrote it, or make it anew"
     )]
     Version {
         /// Magic words of the expected section.
