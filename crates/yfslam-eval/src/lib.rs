@@ -13,6 +13,7 @@
 mod align;
 mod associate;
 mod coverage;
+mod delta;
 mod error;
 mod evaluate;
 mod pose;
@@ -23,11 +24,12 @@ mod statistics;
 pub use align::{Alignment, AlignmentKind, Ate, align, ate, horn_matrix};
 pub use associate::{DEFAULT_MAX_DIFF_NS, Match, associate};
 pub use coverage::Coverage;
+pub use delta::Delta;
 pub use error::{EvalError, Trajectory};
 pub use evaluate::{EvalOptions, Evaluation, ExpectedFrames, evaluate};
 pub use pose::StampedPose;
 pub use published::{Measure, Published, published};
-pub use rpe::{Delta, Rpe, RpeOptions, rpe};
+pub use rpe::{Rpe, RpeOptions, rpe};
 pub use statistics::{Statistics, improvement_percent};
 
 /// The example of the README.

@@ -17,32 +17,8 @@
 //! TUM benchmark with a fixed delta; the error is not divided by the exact time difference.
 
 use crate::associate::nearest;
-use crate::{EvalError, Match, StampedPose, Statistics};
+use crate::{Delta, EvalError, Match, StampedPose, Statistics};
 use serde::{Deserialize, Serialize};
-use std::fmt;
-
-/// Span between the two poses of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Delta {
-    /// Matched poses.
-    Frames(usize),
-    /// Time, s.
-    Seconds(f64),
-    /// Path travelled, m.
-    Metres(f64),
-}
-
-impl fmt::Display for Delta {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Frames(1) => f.write_str("1 frame"),
-            Self::Frames(n) => write!(f, "{n} frames"),
-            Self::Seconds(s) => write!(f, "{s} s"),
-            Self::Metres(m) => write!(f, "{m} m"),
-        }
-    }
-}
 
 /// Options of a relative pose error: which pairs are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
