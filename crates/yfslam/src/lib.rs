@@ -110,4 +110,4 @@ pub use loops::LoopClosure;
 pub use map::{KeyFrame, KeyFrameId, KeyframeRelativePose, Landmark, LandmarkId, Map, MapError};
 pub use system::{FrameRejected, MapUse, SavedMap, SetupError, Slam, SlamBuilder, StageTimes, Statistics, Tracked};
 pub use tracking::{LostReason, TrackingState};
-pub use worker::{Execution, Worker};
+pub use worker::Execution;

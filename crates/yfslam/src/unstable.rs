@@ -14,6 +14,7 @@ use crate::map::{KeyFrame, KeyFrameId, Map};
 
 pub use crate::features::{Descriptor, Features, KeyPoint, OrbExtractor};
 pub use crate::image::{GrayImage, gray_from_rgb};
+pub use crate::worker::{Requests, Worker};
 
 /// Place recognition on a finished map, one query after another.
 pub struct PlaceProbe {

@@ -100,7 +100,7 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
     ///
     /// # Errors
     /// The request, if it was not sent.
-    pub fn try_send(&mut self, request: Q) -> Result<(), Q> {
+    pub(crate) fn try_send(&mut self, request: Q) -> Result<(), Q> {
         let Some(requests) = &self.requests else { return Err(request) };
         match requests.0.try_send(Message::Work(request)) {
             Err(TrySendError::Full(Message::Work(request))) => Err(request),
@@ -123,7 +123,7 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
     }
 
     /// Returns the next answer, if there is one.
-    pub fn poll(&mut self) -> Option<A> {
+    pub(crate) fn poll(&mut self) -> Option<A> {
         let answers = self.answers.as_mut()?.get_mut().unwrap_or_else(PoisonError::into_inner);
         match answers.try_recv() {
             Ok(answer) => Some(answer),

@@ -231,7 +231,8 @@ impl Pipeline {
             self.fail(config)?;
         }
         let map = self.slam.map();
-        let new_keyframes = map.keyframes().filter(|(_, k)| k.sequence >= self.slam.first_keyframe());
+        let first_keyframe = self.slam.statistics().first_keyframe;
+        let new_keyframes = map.keyframes().filter(|(_, k)| k.sequence >= first_keyframe);
         let mut keyframes: Vec<_> = new_keyframes.map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
         keyframes.sort_by_key(|&(sequence, ..)| sequence);
         let landmark = |l: &yfslam::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };

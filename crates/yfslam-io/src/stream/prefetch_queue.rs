@@ -1,9 +1,9 @@
-//! Decodes one kind of image ahead of its use, in order, on a thread with a bounded queue.
+//! Decodes one kind of image ahead of its use, in order, on a worker thread.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, sync_channel};
-use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
+
+use yfslam::unstable::Worker;
 
 use super::FrameFault;
 use crate::error::{Error, Result};
@@ -19,53 +19,51 @@ pub struct Decoded<T> {
 
 /// A queue of images that a thread decodes in order.
 pub struct PrefetchQueue<T> {
-    /// `None` only while dropping.
-    images: Option<Receiver<Decoded<T>>>,
-    thread: Option<JoinHandle<()>>,
+    worker: Worker<usize, Decoded<T>>,
+    /// Number of entries, and of those that were handed to the thread.
+    entries: usize,
+    requested: usize,
 }
 
 impl<T: Send + Sync + 'static> PrefetchQueue<T> {
     /// Starts to decode `entries`; up to `look_ahead` decoded images wait in the queue.
     pub fn start(
-        name: &str,
+        name: &'static str,
         entries: Arc<[FrameEntry]>,
         look_ahead: usize,
         mut decode: impl FnMut(&FrameEntry) -> std::result::Result<T, FrameFault> + Send + 'static,
     ) -> Result<Self> {
-        let (sender, images) = sync_channel(look_ahead);
-        let run = move || {
-            for entry in entries.iter() {
-                let started = Instant::now();
-                let image = decode(entry).map(Arc::new);
-                // The receiver is gone: the stream was dropped.
-                if sender.send(Decoded { image, took: started.elapsed() }).is_err() {
-                    return;
-                }
-            }
+        let count = entries.len();
+        let run = move |index: usize| {
+            let started = Instant::now();
+            let image = decode(entries.get(index)?).map(Arc::new);
+            Some(Decoded { image, took: started.elapsed() })
         };
-        let thread = Builder::new().name(name.into()).spawn(run).map_err(|error| {
+        let worker = Worker::spawn(name, look_ahead + 1, |_| run).map_err(|error| {
             Error::argument(
                 format!("cannot start a decoder thread: {error}"),
                 "raise the limit of threads for this user",
             )
         })?;
-        Ok(Self { images: Some(images), thread: Some(thread) })
+        let mut queue = Self { worker, entries: count, requested: 0 };
+        (0..=look_ahead).for_each(|_| queue.request());
+        Ok(queue)
+    }
+
+    /// Hands the next entry to the thread, if there is one.
+    fn request(&mut self) {
+        if self.requested < self.entries {
+            // A thread that has ended is noticed when its answer is awaited.
+            self.worker.send(self.requested);
+            self.requested += 1;
+        }
     }
 
     /// Returns the next image; waits until it is decoded.
     pub fn next(&mut self) -> Decoded<T> {
-        let received = self.images.as_ref().and_then(|images| images.recv().ok());
-        received.unwrap_or(Decoded { image: Err(FrameFault::DecoderStopped), took: Duration::ZERO })
-    }
-}
-
-impl<T> Drop for PrefetchQueue<T> {
-    fn drop(&mut self) {
-        self.images = None;
-        if let Some(thread) = self.thread.take() {
-            // A panic of the decoder has already been reported as `DecoderStopped`.
-            let _ = thread.join();
-        }
+        let decoded = self.worker.wait();
+        self.request();
+        decoded.unwrap_or(Decoded { image: Err(FrameFault::DecoderStopped), took: Duration::ZERO })
     }
 }
 

@@ -69,7 +69,7 @@ impl CellGrid {
     }
 
     /// Returns the centre of a cell, px of the raw image.
-    pub fn middle_px(&self, cell: usize) -> [f32; 2] {
+    pub(crate) fn middle_px(&self, cell: usize) -> [f32; 2] {
         let half = 0.5 * (self.stride_px - 1) as f32;
         [cell % self.columns, cell / self.columns].map(|at| (at * self.stride_px) as f32 + half)
     }
@@ -144,7 +144,7 @@ impl KeyframePatch {
     }
 
     /// Returns the patch with classes; `class(position)` returns the class at a position of the image, px, 0 where it is unknown.
-    pub fn with_classes(mut self, grid: &CellGrid, class: impl Fn([f32; 2]) -> u8) -> Self {
+    pub(crate) fn with_classes(mut self, grid: &CellGrid, class: impl Fn([f32; 2]) -> u8) -> Self {
         let of_cell = |cell| self.surface_m(cell).map_or(0, |_| class(grid.middle_px(cell)));
         self.class = (0..self.depth.len()).map(of_cell).collect();
         self
@@ -170,7 +170,7 @@ impl KeyframePatch {
 
     /// Returns the depth of a cell's static surface, m; `None` if there is none.
     #[inline]
-    pub fn surface_m(&self, cell: usize) -> Option<f32> {
+    pub(crate) fn surface_m(&self, cell: usize) -> Option<f32> {
         self.reading(cell).filter(|reading| !reading.moves).map(|reading| reading.depth_m)
     }
 

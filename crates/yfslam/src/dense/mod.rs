@@ -44,7 +44,7 @@ pub(crate) use mapper::{DenseMapper, Source};
 pub use mesh::{Mesh, mesh};
 pub use view::DenseView;
 pub use volume::{KnownVoxel, Volume};
-pub use voxels::{Block, SIDE as BLOCK_SIDE, Voxel, block_of, center_m, voxel_at};
+pub use voxels::{Block, SIDE as BLOCK_SIDE, Voxel, center_m, voxel_at};
 
 use nalgebra::UnitQuaternion;
 

@@ -24,7 +24,7 @@ pub fn voxel_at(p: &Point3<f32>, per_m: f32) -> Voxel {
 
 /// Returns the block that contains a voxel.
 #[inline]
-pub fn block_of(voxel: Voxel) -> Block {
+pub(crate) fn block_of(voxel: Voxel) -> Block {
     voxel.map(|v| v.div_euclid(SIDE))
 }
 

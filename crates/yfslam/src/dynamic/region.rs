@@ -40,7 +40,7 @@ impl MovingMask {
 
     /// Returns whether a position, px of the raw image, lies on something that moves or within `edge_px` of it; `depth` is the
     /// depth image of the frame, px.
-    pub fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
+    pub(crate) fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
         self.instances.covers(raw, edge_px) || self.regions.iter().any(|region| region.covers(depth, raw, edge_px))
     }
 }
@@ -75,7 +75,7 @@ pub(super) fn apply_regions(
 impl Region {
     /// Returns whether a feature at a position, px of the raw image, belongs to the moving object: it lies inside the box, and
     /// within the depth interval, without a measured depth, or within `edge_px` of the object.
-    pub fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
+    pub(crate) fn covers(&self, depth: &DepthImage, raw: [f32; 2], edge_px: f32) -> bool {
         let [x, y] = raw;
         if !self.bbox.contains(x, y) {
             return false;

@@ -110,13 +110,8 @@ impl FrameFeatures {
     }
 
     /// Returns the number of features.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.features.len()
-    }
-
-    /// Returns whether there are no features.
-    pub fn is_empty(&self) -> bool {
-        self.features.is_empty()
     }
 
     /// Calls `visit` with the index of each feature within `radius` (px, maximum norm) of (u, v) whose octave is in `octaves`.

@@ -45,7 +45,8 @@ impl Map {
     }
 
     /// Returns the number of submaps.
-    pub fn submap_count(&self) -> usize {
+    #[cfg(test)]
+    pub(crate) fn submap_count(&self) -> usize {
         self.keyframes.values().filter(|k| k.parent.is_none()).count()
     }
 

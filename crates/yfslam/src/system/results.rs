@@ -24,6 +24,10 @@ pub struct Statistics {
     pub detector_failures: usize,
     /// Frames in which nothing searched for people although the filter needs that.
     pub frames_without_detector: usize,
+    /// Sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
+    pub first_keyframe: u64,
+    /// Whether mapping on its own thread has ended by a panic, so that the map can no longer grow.
+    pub mapping_has_ended: bool,
     /// Keyframe patches of the dense map.
     pub dense_patches: usize,
     /// Keyframe patches that were left out because the thread of the dense map was busy.
@@ -42,6 +46,8 @@ impl Slam {
     /// Returns the counts of this session.
     pub fn statistics(&self) -> Statistics {
         let mut statistics = self.statistics;
+        statistics.first_keyframe = self.first_keyframe;
+        statistics.mapping_has_ended = !self.owner.is_alive();
         if let Some(dense) = &self.dense {
             statistics.dense_patches = dense.len();
             statistics.dense_patches_skipped = dense.patches_skipped();
@@ -81,11 +87,6 @@ impl Slam {
         of_submaps.into_iter().map(|(_, poses)| poses).collect()
     }
 
-    /// Returns whether the map can still grow: false once mapping on its own thread has ended by a panic.
-    pub fn is_mapping_alive(&self) -> bool {
-        self.owner.is_alive()
-    }
-
     /// Returns the features of the last frame, with their depth and static probability.
     pub fn features(&self) -> &[Feature] {
         &self.tracker.current.features.features
@@ -104,11 +105,6 @@ impl Slam {
     /// Returns the parts of the last frame that were found to move.
     pub fn moving_regions(&self) -> &[Region] {
         self.filter.regions()
-    }
-
-    /// Returns the sequence number of the first keyframe of this session; those of a map from an earlier one are lower.
-    pub fn first_keyframe(&self) -> u64 {
-        self.first_keyframe
     }
 
     /// Returns the map: with mapping on its own thread, as it was after the last keyframe that is finished.

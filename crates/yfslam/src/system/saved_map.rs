@@ -5,7 +5,7 @@ use crate::config::FeatureConfig;
 use crate::dense::DenseMap;
 use crate::map::Map;
 use crate::map::container::DENSE_MAP;
-use crate::map::persist::{MapError, MapParts, decode, encode};
+use crate::map::persist::{MapError, MapParts, decode};
 
 /// A map with what it was made with.
 #[derive(Clone, Debug)]
@@ -28,24 +28,9 @@ impl SavedMap {
         Ok(Self { map, camera, features, dense })
     }
 
-    /// Returns the map as bytes, for [`SavedMap::from_bytes`].
-    ///
-    /// # Errors
-    /// If it cannot be written, which would be a fault of this program.
-    pub fn to_bytes(&self) -> Result<Vec<u8>, MapError> {
-        let mut bytes = self.dense.as_ref().map_or_else(|| Ok(Vec::new()), DenseMap::to_bytes)?;
-        bytes.extend(encode(&self.map, &self.camera, &self.features)?);
-        Ok(bytes)
-    }
-
     /// Returns the keyframes and landmarks.
     pub fn map(&self) -> &Map {
         &self.map
-    }
-
-    /// Returns the camera that made the map.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
     }
 
     /// Returns the dense map that was saved with it.

@@ -1,7 +1,5 @@
 use std::collections::BTreeSet;
 
-use yfslam::dense::block_of;
-
 use super::*;
 
 fn cube(side: i32, log_odds: f32) -> Vec<OctreeVoxel> {
@@ -10,7 +8,7 @@ fn cube(side: i32, log_odds: f32) -> Vec<OctreeVoxel> {
 }
 
 fn write(path: &Path, resolution_m: f64, voxels: &[OctreeVoxel], format: OctreeFormat) -> Result<OctreeSize> {
-    let block = |one: &OctreeVoxel| block_of(one.voxel);
+    let block = |one: &OctreeVoxel| one.voxel.map(|v| v.div_euclid(SIDE));
     let blocks: BTreeSet<Block> = voxels.iter().map(block).collect();
     let within = |wanted| voxels.iter().filter(move |one| block(one) == wanted).copied();
     write_octomap(path, resolution_m, blocks, within, format)
