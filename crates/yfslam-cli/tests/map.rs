@@ -153,7 +153,8 @@ fn the_map_of_two_sessions_shows_what_both_have_observed() {
     let parts = [occupied(&part(&both.patches[..earlier])).0, occupied(&part(&both.patches[earlier..])).0];
     let (voxels, volume) = occupied(&both);
     for part in parts {
-        let kept = part.iter().filter(|voxel| volume.is_occupied(**voxel)).count() as f64 / part.len() as f64;
+        let kept = part.iter().filter(|voxel| volume.get(**voxel).is_some_and(|known| known.occupied)).count() as f64
+            / part.len() as f64;
         let more = voxels.len() as f64 / part.len() as f64;
         println!("{} of {} voxels; {kept:.3} of them are in the map of both", part.len(), voxels.len());
         assert!(kept > 0.9 && more > 1.2, "{kept} of a part are in the map of both, which is {more} times as large");

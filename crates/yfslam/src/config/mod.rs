@@ -112,7 +112,7 @@ impl Config {
 
     /// Returns the configuration as the stages use it: for a camera without depth, section `monocular` replaces keys of other sections.
     #[must_use]
-    pub fn for_sensor(mut self) -> Self {
+    pub(crate) fn for_sensor(mut self) -> Self {
         if self.depth.source == DepthSource::Motion {
             let m = &self.monocular;
             self.keyframes.reference_ratio = m.reference_ratio;

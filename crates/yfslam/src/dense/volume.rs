@@ -140,7 +140,7 @@ impl Volume {
     }
 
     /// Returns whether a voxel is occupied.
-    pub fn is_occupied(&self, voxel: Voxel) -> bool {
+    pub(crate) fn is_occupied(&self, voxel: Voxel) -> bool {
         self.get(voxel).is_some_and(|known| known.occupied)
     }
 

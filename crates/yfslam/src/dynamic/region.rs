@@ -34,7 +34,7 @@ pub struct MovingMask {
 
 impl MovingMask {
     /// Returns the mask of these regions.
-    pub fn from_regions(regions: Vec<Region>) -> Self {
+    pub(crate) fn from_regions(regions: Vec<Region>) -> Self {
         Self { regions, ..Self::default() }
     }
 

@@ -46,7 +46,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
         name: name(args),
         camera,
         depth_source: sequence.depth_source,
-        frames: Frames::new(Player::Folder(stream, Box::new(extras)), sequence.depth_source, args, &stamps_ns),
+        frames: Frames::new(Player::Folder(Box::new((stream, extras))), sequence.depth_source, args, &stamps_ns),
         stamps_ns,
         association: Some(sequence.report),
         truth_reader: Some(sequence.ground_truth),

@@ -23,7 +23,7 @@ pub struct Frames {
 /// Where frames come from.
 pub enum Player {
     /// Files of a recording.
-    Folder(FrameStream, Box<FolderExtras>),
+    Folder(Box<(FrameStream, FolderExtras)>),
     /// A synthetic world.
     Synth(Renderer),
 }
@@ -48,7 +48,7 @@ impl Frames {
                 return Some(usable(delivery, self.depth_source));
             }
             let frame = match &mut self.player {
-                Player::Folder(stream, extras) => folder::next(stream, extras, stages),
+                Player::Folder(recording) => folder::next(&mut recording.0, &mut recording.1, stages),
                 Player::Synth(renderer) => renderer.next(stages).map(Ok),
             };
             match frame {
