@@ -31,7 +31,7 @@
 //!
 //! | wish | how |
 //! |---|---|
-//! | a person detector | [`SlamBuilder::detector`] with `PersonDetector::embedded()` of the crate `yfslam-detect`, or your own [`Detector`] |
+//! | a person detector | [`SlamBuilder::detector`] with `YoloFastestV2::embedded` of the crate `yfslam-detect`, or your own [`Detector`] |
 //! | detections or masks from elsewhere | [`Frame::with_detections`], [`Frame::with_mask`] |
 //! | your own dynamic filter | [`SlamBuilder::filter`] with a [`DynamicFilter`] |
 //! | another filter of ours, any constant | [`SlamBuilder::config`] with a [`Config`]; [`Method`] lists the filters |
