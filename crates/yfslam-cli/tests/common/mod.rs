@@ -92,7 +92,9 @@ fn render() -> TempDir {
         let (t, q) = (shot.t_world_cam.translation, shot.t_world_cam.rotation);
         writeln!(truth, "{stamp} {} {} {} {} {} {} {}", t.x, t.y, t.z, q.i, q.j, q.k, q.w).unwrap();
     }
-    let camera = toml::to_string(&world.config().camera).unwrap();
+    let factor = world.config().depth_factor;
+    // Scalar keys must stand before the tables of the camera.
+    let camera = format!("depth_factor = {factor:?}\n{}", toml::to_string(&world.config().camera).unwrap());
     for (name, text) in [("rgb.txt", rgb), ("depth.txt", depth), ("groundtruth.txt", truth), ("camera.toml", camera)] {
         fs::write(folder.join(name), text).unwrap();
     }
