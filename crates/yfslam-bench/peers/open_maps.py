@@ -54,7 +54,7 @@ def extent(points):
 
 
 def clouds(folder, count):
-    """PLY and PCD hold the same points, whoever reads them."""
+    """PLY and PCD hold the same points, in every program that reads them."""
     extents, labels = {}, {}
     if o3d := reader("open3d"):
         for name in ["cloud.ply", "cloud.pcd"]:

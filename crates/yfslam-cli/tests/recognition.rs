@@ -105,7 +105,7 @@ fn a_map_that_cannot_be_used_is_refused_with_its_name() {
         fails(folder.path(), &[&["run", DESK, "--load-map", "bad.map", "-q"], more].concat(), &["bad.map", why]);
     };
     refused(b"%YAML:1.0", "this is no yfslam map", &[]);
-    refused(&bytes[..bytes.len() / 2], "it was cut", &[]);
+    refused(&bytes[..bytes.len() / 2], "it was truncated", &[]);
     let mut altered = bytes.clone();
     *altered.last_mut().unwrap() ^= 4;
     refused(&altered, "it was altered", &[]);

@@ -1,4 +1,4 @@
-//! Dependencies run one way: between the folders of a crate, and between the crates of the workspace.
+//! Dependencies run one way: between the folders of a crate, and between the crates of the workspace. The core's public surface is small.
 
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
@@ -17,6 +17,9 @@ const LAYERS: [&[&str]; 4] = [
     &["yfslam-report"],
     &["yfslam-bench", "yfslam-cli"],
 ];
+
+/// Most public functions that the core may have. Its lint `unreachable_pub` makes each `pub fn` a function that users can reach.
+const PUBLIC_FUNCTIONS: usize = 120;
 
 /// What depends on what.
 type Graph = BTreeMap<String, BTreeSet<String>>;
@@ -46,6 +49,22 @@ fn crates_depend_on_lower_layers_only() {
             assert!(in_order, "{name} must not depend on {other}");
         }
     }
+}
+
+#[test]
+fn the_public_surface_of_the_core_stays_small() {
+    let src = workspace().join("crates/yfslam/src");
+    let root = fs::read_to_string(src.join("lib.rs")).unwrap();
+    assert!(root.contains("#![deny(unreachable_pub)]"), "without this lint the count below means nothing");
+    let mut files = Vec::new();
+    list_files(&src, &mut files);
+    let count = |file: &PathBuf| {
+        let code = without_tests_and_comments(&fs::read_to_string(file).unwrap());
+        let starts = ["pub fn ", "pub const fn ", "pub unsafe fn "];
+        code.lines().filter(|line| starts.iter().any(|start| line.trim_start().starts_with(start))).count()
+    };
+    let functions: usize = files.iter().map(count).sum();
+    assert!((1..=PUBLIC_FUNCTIONS).contains(&functions), "{functions} public functions, at most {PUBLIC_FUNCTIONS}");
 }
 
 /// Returns a circle of dependencies, if there is one.

@@ -1,7 +1,8 @@
 //! In: two trajectories and what to measure. Out: every figure of one run.
 
 use crate::{
-    AlignmentKind, Ate, Coverage, DEFAULT_MAX_DIFF_NS, EvalError, Rpe, RpeOptions, StampedPose, associate, ate, rpe,
+    AlignmentKind, Ate, Coverage, DEFAULT_MAX_DIFF_NS, EvalError, Match, Rpe, RpeOptions, StampedPose, associate, ate,
+    rpe,
 };
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +58,9 @@ pub struct Evaluation {
     pub ate: Ate,
     /// Relative pose errors, in the order of the options.
     pub rpe: Vec<Rpe>,
+    /// Length of the estimated path divided by that of the reference, both through the matched poses and with the scale of the
+    /// alignment; `None` if the reference does not move.
+    pub path_ratio: Option<f64>,
     /// Tracked fraction, if the expected frames are known.
     pub coverage: Option<Coverage>,
 }
@@ -86,7 +90,21 @@ pub fn evaluate(
         matches: matches.len(),
         max_diff_ns: options.max_diff_ns,
         ate,
+        path_ratio: path_ratio(&scaled),
         rpe: options.rpe.iter().map(|o| rpe(&scaled, o)).collect::<Result<_, _>>()?,
         coverage,
     })
+}
+
+fn path_ratio(matches: &[Match]) -> Option<f64> {
+    let (reference, estimate) = matches.windows(2).fold((0.0, 0.0), |(reference, estimate), pair| {
+        let step = |a: &StampedPose, b: &StampedPose| {
+            (b.t_world_cam.translation.vector - a.t_world_cam.translation.vector).norm()
+        };
+        (
+            reference + step(&pair[0].reference, &pair[1].reference),
+            estimate + step(&pair[0].estimate, &pair[1].estimate),
+        )
+    });
+    (reference > 0.0).then(|| estimate / reference)
 }

@@ -235,3 +235,15 @@ fn an_evaluation_survives_json() {
     assert_eq!((again.matches, again.coverage), (evaluation.matches, evaluation.coverage));
     assert!((again.ate.alignment.scale - 2.0).abs() < 1e-9 && again.rpe.len() == evaluation.rpe.len());
 }
+
+#[test]
+fn the_path_ratio_is_the_scale_of_the_estimate_unless_the_alignment_takes_it_out() {
+    let reference = curve(30);
+    let half = transformed(&reference, 0.5, &at(1.0, 2.0, 3.0));
+    let ratio = |alignment| {
+        let options = EvalOptions { alignment, ..EvalOptions::default() };
+        evaluate(&reference, &half, &options).unwrap().path_ratio.unwrap()
+    };
+    assert!((ratio(AlignmentKind::Se3) - 0.5).abs() < 1e-9);
+    assert!((ratio(AlignmentKind::Sim3) - 1.0).abs() < 1e-9);
+}

@@ -16,7 +16,7 @@
 //!
 //! fn play(folder: &std::path::Path) -> Result<()> {
 //!     let sequence = Sequence::open(folder, &SequenceOptions::default())?;
-//!     let camera = detect_camera(folder)?.camera;
+//!     let camera = detect_camera(folder)?;
 //!     check_recording(&sequence, &camera)?;
 //!     let mut skipped = 0;
 //!     for frame in FrameStream::open(&sequence, &camera, stream::DEFAULT_LOOK_AHEAD)? {

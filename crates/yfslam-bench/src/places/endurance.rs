@@ -35,7 +35,7 @@ pub fn measure(
                     .figure("frames", length)
                     .figure("lost", lost)
                     .figure("keyframes", slam.map().keyframe_count())
-                    .figure("landmarks", slam.map().landmark_count())
+                    .figure("landmarks", slam.map().landmarks().count())
                     .figure("process_mb", resident_mb())
                     .figure("frame_median_ms", times[times.len() / 2])
                     .figure("frame_p99_ms", times[times.len() * 99 / 100])

@@ -66,14 +66,7 @@ pub fn accuracy(row: Row, run: &Value) -> Row {
         .figure("rpe_frame_deg", number(run, "/evaluation/rpe/0/rotation_deg/rmse"))
         .figure("rpe_second_m", number(run, "/evaluation/rpe/1/translation_m/rmse"))
         .figure("rpe_second_deg", number(run, "/evaluation/rpe/1/rotation_deg/rmse"))
-        .figure("path_ratio", path_ratio(run))
-}
-
-/// Length of the estimated path by that of the true one, where `run.json` has it.
-fn path_ratio(run: &Value) -> Option<f64> {
-    ["/evaluation/path_ratio", "/evaluation/path_length_ratio", "/evaluation/path/ratio"]
-        .iter()
-        .find_map(|path| number(run, path))
+        .figure("path_ratio", number(run, "/evaluation/path_ratio"))
 }
 
 /// The method's row: its figures, or why there are none.

@@ -7,23 +7,19 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::UnitQuaternion;
-
 use crate::camera::Camera;
 use crate::config::{DenseConfig, DynamicConfig};
+use crate::dense::fusion::FusionOwner;
 use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
 use crate::dense::object_masks::ObjectMasks;
 use crate::dense::volume::Volume;
-use crate::dense::{DenseError, DenseMap, PlacedPatch, gravity};
+use crate::dense::{DenseError, DenseMap, PlacedPatch};
 use crate::detect::Detection;
 use crate::dynamic::MovingMask;
 use crate::geometry::Pose;
 use crate::image::{DepthImage, RgbImage};
 use crate::map::{KeyFrameId, KeyframeRelativePose, Map};
-use crate::worker::{Execution, Worker};
-
-/// Length of the thread's queue.
-const QUEUE_LENGTH: usize = 2;
+use crate::worker::Execution;
 
 /// The patches of keyframes, and the volume that follows their poses in the map.
 pub(crate) struct DenseMapper {
@@ -53,39 +49,6 @@ pub(crate) struct Source<'a> {
     pub objects: Option<&'a [Detection]>,
 }
 
-/// A patch with its time, ns; shared with snapshots.
-type TimedPatch = (i64, Arc<KeyframePatch>);
-
-/// The owner of patches and volume: this object or a thread.
-enum FusionOwner {
-    Inline(Box<Fusion>),
-    Threaded(Worker<Request, Answer>),
-}
-
-/// A request to the thread.
-enum Request {
-    Integrate(Vec<TimedPatch>, Vec<Option<Pose>>),
-    Volume,
-    Patches,
-    Clear,
-}
-
-/// An answer of the thread.
-enum Answer {
-    Volume(Box<Volume>),
-    Patches(Vec<TimedPatch>),
-}
-
-/// Patches and the volume made of them.
-#[derive(Clone, Debug)]
-struct Fusion {
-    grid: CellGrid,
-    /// Turns the world so that the z-axis points up.
-    up: UnitQuaternion<f64>,
-    patches: Vec<TimedPatch>,
-    volume: Volume,
-}
-
 impl DenseMapper {
     /// Returns a dense map for one camera. The z-axis of the volume points up in the first image, as in ROS (REP 103).
     ///
@@ -94,14 +57,7 @@ impl DenseMapper {
     pub(crate) fn new(config: &DenseConfig, camera: &Camera, execution: Execution) -> Result<Self, DenseError> {
         config.validate()?;
         let grid = CellGrid::new(camera, config.stride_px);
-        let mut fusion =
-            Fusion { grid: grid.clone(), up: gravity::of_camera(), patches: Vec::new(), volume: Volume::new(config) };
-        let fusion = match execution {
-            Execution::Inline => FusionOwner::Inline(Box::new(fusion)),
-            Execution::Threaded => FusionOwner::Threaded(Worker::spawn("dense map", QUEUE_LENGTH, |_| {
-                move |request| fusion.handle(request)
-            })?),
-        };
+        let fusion = FusionOwner::new(config, &grid, execution)?;
         Ok(Self {
             config: config.clone(),
             grid,
@@ -277,86 +233,6 @@ fn largest(poses: &[Option<(KeyFrameId, Pose)>]) -> Option<KeyFrameId> {
         }
     }
     counts.iter().rev().max_by_key(|(count, _)| *count).map(|(_, root)| *root)
-}
-
-impl FusionOwner {
-    /// Integrates patches and moves all to `poses`. Returns whether the patches were accepted.
-    fn integrate(&mut self, patches: Vec<TimedPatch>, poses: Vec<Option<Pose>>) -> bool {
-        match self {
-            Self::Inline(fusion) => {
-                fusion.integrate(patches, &poses);
-                true
-            }
-            Self::Threaded(worker) => worker.try_send(Request::Integrate(patches, poses)).is_ok(),
-        }
-    }
-
-    fn volume(&mut self, poses: Vec<Option<Pose>>) -> Option<Volume> {
-        match self {
-            Self::Inline(fusion) => {
-                fusion.integrate(Vec::new(), &poses);
-                Some(fusion.updated_volume())
-            }
-            Self::Threaded(worker) => {
-                let sent = worker.send(Request::Integrate(Vec::new(), poses)) && worker.send(Request::Volume);
-                match sent.then(|| worker.wait())?? {
-                    Answer::Volume(volume) => Some(*volume),
-                    Answer::Patches(_) => None,
-                }
-            }
-        }
-    }
-
-    fn patches(&mut self) -> Vec<TimedPatch> {
-        match self {
-            Self::Inline(fusion) => fusion.patches.clone(),
-            Self::Threaded(worker) => match worker.send(Request::Patches).then(|| worker.wait()).flatten() {
-                Some(Answer::Patches(patches)) => patches,
-                _ => Vec::new(),
-            },
-        }
-    }
-
-    fn clear(&mut self) {
-        match self {
-            Self::Inline(fusion) => fusion.clear(),
-            Self::Threaded(worker) => {
-                // A thread that has ended has nothing to remove.
-                worker.send(Request::Clear);
-            }
-        }
-    }
-}
-
-impl Fusion {
-    fn handle(&mut self, request: Request) -> Option<Answer> {
-        match request {
-            Request::Integrate(patches, poses) => self.integrate(patches, &poses),
-            Request::Volume => return Some(Answer::Volume(Box::new(self.updated_volume()))),
-            Request::Patches => return Some(Answer::Patches(self.patches.clone())),
-            Request::Clear => self.clear(),
-        }
-        None
-    }
-
-    /// Adds patches, and moves all patches to their poses.
-    fn integrate(&mut self, patches: Vec<TimedPatch>, poses: &[Option<Pose>]) {
-        self.patches.extend(patches);
-        for (number, ((_, patch), pose)) in self.patches.iter().zip(poses).enumerate() {
-            let pose = pose.map(|t_world_cam| self.up * t_world_cam);
-            self.volume.integrate(number, &self.grid, patch, pose.as_ref());
-        }
-    }
-
-    fn updated_volume(&mut self) -> Volume {
-        self.volume.update();
-        self.volume.clone()
-    }
-
-    fn clear(&mut self) {
-        self.patches.clear();
-        self.volume = Volume::new(self.volume.config());
-    }
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@ mod background;
 mod block_state;
 mod classes;
 mod cloud;
+mod fusion;
 mod gravity;
 mod grid;
 mod keyframe_patch;

@@ -70,7 +70,7 @@ impl Map {
     }
 
     /// Returns the number of landmarks.
-    pub fn landmark_count(&self) -> usize {
+    pub(crate) fn landmark_count(&self) -> usize {
         self.landmarks.len()
     }
 

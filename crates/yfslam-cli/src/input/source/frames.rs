@@ -48,7 +48,7 @@ impl Frames {
                 return Some(usable(delivery, self.depth_source));
             }
             let frame = match &mut self.player {
-                Player::Folder(recording) => folder::next(&mut recording.0, &mut recording.1, stages),
+                Player::Folder(recording) => folder::next(&mut recording.0, &recording.1, stages),
                 Player::Synth(renderer) => renderer.next(stages).map(Ok),
             };
             match frame {
