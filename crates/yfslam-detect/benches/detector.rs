@@ -1,5 +1,5 @@
 //! Times of the detector on one thread: the forward pass at every level, a whole image, loading a model. The network has random
-//! weights and the official size, so that no data is needed; `benches/peers_detector.py` compares with other engines.
+//! weights and the official size, so that no data is needed; `crates/yfslam-bench/peers/peers_detector.py` compares with other engines.
 #![allow(clippy::expect_used, reason = "a benchmark fails as tests do")]
 
 #[path = "../tests/common/mod.rs"]

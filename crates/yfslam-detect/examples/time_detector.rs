@@ -1,5 +1,5 @@
 //! Measures the forward pass and the whole `detect` on one thread: process CPU time of every run, as one line of JSON per
-//! instruction set; `benches/peers_detector.py` compares it with other engines.
+//! instruction set; `crates/yfslam-bench/peers/peers_detector.py` compares it with other engines.
 //!
 //! `cargo run --release -p yfslam-detect --example time_detector -- model.onnx [runs [integers]]`
 #![allow(clippy::print_stdout, reason = "the result goes to standard output")]
