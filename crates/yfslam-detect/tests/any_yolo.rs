@@ -104,7 +104,7 @@ fn a_network_that_neither_runtime_supports_is_refused_and_each_runtime_takes_its
     strange.metadata.clear();
     assert!(words(&strange, &config).contains("3 classes without names"), "{}", words(&strange, &config));
     let integers = DetectorConfig { integers: true, ..config.clone() };
-    assert!(words(&net("columns"), &integers).contains("integers are for YOLO-FastestV2 alone"));
+    assert!(words(&net("columns"), &integers).contains("integers are supported for YOLO-FastestV2 only"));
     let named = DetectorConfig { class_names: vec!["a".into()], ..config };
     assert!(words(&net("columns"), &named).contains("3 classes, but 1 names"));
     let error = AnyYolo::from_bytes("test.onnx", b"hello", &DetectorConfig::default()).err().unwrap();
