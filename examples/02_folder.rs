@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             Err(error) => println!("skipped: {error}"),
         }
     }
-    let stamped = |(timestamp_ns, pose)| StampedPose { timestamp_ns, pose };
+    let stamped = |(timestamp_ns, pose)| StampedPose::new(timestamp_ns, pose);
     let trajectory: Vec<StampedPose> = slam.trajectory().into_iter().map(stamped).collect();
     write_trajectory(Path::new("trajectory.txt"), &trajectory)?;
     println!("trajectory.txt: {} poses; {lost} frames without a pose", trajectory.len());

@@ -71,13 +71,12 @@ pub fn ground_truth(folder: &Path, part: Part) -> Result<Vec<StampedPose>> {
     if let Some(mirror) = mirror {
         truth = mirror_trajectory(&truth, mirror);
     }
-    Ok(truth.iter().map(|pose| StampedPose::new(pose.timestamp_ns, pose.pose)).collect())
+    Ok(truth)
 }
 
 /// The absolute trajectory error of a file after alignment, RMSE, m; `None` if it has too few poses to be aligned.
 pub fn ate_m(truth: &[StampedPose], file: &Path, kind: AlignmentKind) -> Option<f64> {
-    let poses = TrajectoryFile::read(file).ok()?.poses;
-    let estimate: Vec<_> = poses.iter().map(|pose| StampedPose::new(pose.timestamp_ns, pose.pose)).collect();
+    let estimate = TrajectoryFile::read(file).ok()?.poses;
     let options =
         EvalOptions { max_diff_ns: MAX_DIFFERENCE_NS, alignment: kind, rpe: Vec::new(), ..Default::default() };
     Some(evaluate(truth, &estimate, &options).ok()?.ate.translation_m.rmse)

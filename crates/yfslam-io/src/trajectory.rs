@@ -5,6 +5,8 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
+pub use yfslam_eval::StampedPose;
+
 use crate::atomic_file::write_atomically;
 use crate::error::{Error, Result};
 use crate::text::{content_lines, read_text};
@@ -18,15 +20,6 @@ const MAX_NORM_ERROR: f64 = 0.05;
 const COLUMNS: [&str; 7] = ["tx", "ty", "tz", "qx", "qy", "qz", "qw"];
 
 const FORMAT_CURE: &str = "write 'timestamp tx ty tz qx qy qz qw' with blanks between the values";
-
-/// Pose of the camera at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StampedPose {
-    /// Time, ns.
-    pub timestamp_ns: i64,
-    /// World from camera, m: maps points from the camera frame (x right, y down, z forward) into the world frame.
-    pub pose: Isometry3<f64>,
-}
 
 /// A trajectory read from a file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -82,8 +75,8 @@ pub fn mirror_trajectory(poses: &[StampedPose], mirror: TimeMirror) -> Vec<Stamp
 pub fn write_trajectory(path: &Path, poses: &[StampedPose]) -> Result<()> {
     write_atomically(path, |writer| {
         writeln!(writer, "# timestamp tx ty tz qx qy qz qw")?;
-        for StampedPose { timestamp_ns, pose } in poses {
-            let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        for StampedPose { timestamp_ns, t_world_cam } in poses {
+            let (t, q) = (t_world_cam.translation.vector, t_world_cam.rotation.coords);
             let stamp = format_stamp(*timestamp_ns);
             if !t.iter().chain(q.iter()).all(|value| value.is_finite()) {
                 return Err(io::Error::new(io::ErrorKind::InvalidData, format!("the pose at {stamp} is not finite")));
@@ -122,7 +115,7 @@ fn parse_pose(line: &str, path: &Path, number: usize) -> Result<StampedPose> {
         return Err(Error::line(path, number, problem, "check the order of the columns: tx ty tz qx qy qz qw"));
     }
     let pose = Isometry3::from_parts(Translation3::new(tx, ty, tz), UnitQuaternion::from_quaternion(quaternion));
-    Ok(StampedPose { timestamp_ns, pose })
+    Ok(StampedPose::new(timestamp_ns, pose))
 }
 
 #[cfg(test)]
@@ -146,10 +139,10 @@ mod tests {
         let file = parse(GOOD).unwrap();
         assert_eq!(file.poses.len(), 2);
         assert_eq!(file.poses[0].timestamp_ns, 1_305_031_101_175_900_000);
-        assert_eq!(file.poses[0].pose.translation.vector.as_slice(), [1.3812, 0.6186, 1.6987]);
+        assert_eq!(file.poses[0].t_world_cam.translation.vector.as_slice(), [1.3812, 0.6186, 1.6987]);
         assert!(
-            (file.poses[0].pose.rotation.w + 0.3248).abs() < 1e-4
-                && (file.poses[0].pose.rotation.norm() - 1.0).abs() < 1e-12
+            (file.poses[0].t_world_cam.rotation.w + 0.3248).abs() < 1e-4
+                && (file.poses[0].t_world_cam.rotation.norm() - 1.0).abs() < 1e-12
         );
         assert_eq!(file.poses[1].timestamp_ns, 1_305_031_102_175_899_982);
     }
@@ -187,7 +180,8 @@ mod tests {
         let lines: String = (1..=3).map(|t| format!("{t} {t} 0 0 0 0 0 1\n")).collect();
         let poses = parse(&lines).unwrap().poses;
         let mirrored = mirror_trajectory(&poses, TimeMirror { first_ns: 1_000_000_000, last_ns: 4_000_000_000 });
-        let seen: Vec<_> = mirrored.iter().map(|p| (p.timestamp_ns / 1_000_000_000, p.pose.translation.x)).collect();
+        let seen: Vec<_> =
+            mirrored.iter().map(|p| (p.timestamp_ns / 1_000_000_000, p.t_world_cam.translation.x)).collect();
         assert_eq!(seen, [(2, 3.0), (3, 2.0), (4, 1.0)]);
     }
 
@@ -195,7 +189,7 @@ mod tests {
     fn a_pose_that_is_not_finite_is_never_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("poses.txt");
-        let pose = StampedPose { timestamp_ns: 5, pose: Isometry3::translation(f64::NAN, 0.0, 0.0) };
+        let pose = StampedPose::new(5, Isometry3::translation(f64::NAN, 0.0, 0.0));
         let error = write_trajectory(&path, &[pose]).unwrap_err().to_string();
         assert!(error.contains("poses.txt") && error.contains("0.000000005"), "{error}");
         assert!(!path.exists());
@@ -206,9 +200,9 @@ mod tests {
         fn what_is_written_is_read_again(raw in prop::collection::vec((0i64..1 << 60, prop::array::uniform6(-9.0..9.0f64)), 1..20)) {
             let mut poses: Vec<_> = raw
                 .into_iter()
-                .map(|(timestamp_ns, [x, y, z, a, b, c])| StampedPose {
-                    timestamp_ns,
-                    pose: Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(a, b, c)),
+                .map(|(timestamp_ns, [x, y, z, a, b, c])| {
+                    let rotation = UnitQuaternion::from_euler_angles(a, b, c);
+                    StampedPose::new(timestamp_ns, Isometry3::from_parts(Translation3::new(x, y, z), rotation))
                 })
                 .collect();
             poses.sort_by_key(|p| p.timestamp_ns);
@@ -220,8 +214,8 @@ mod tests {
             prop_assert_eq!(read.poses.len(), poses.len());
             for (read, written) in read.poses.iter().zip(&poses) {
                 prop_assert_eq!(read.timestamp_ns, written.timestamp_ns);
-                prop_assert!((read.pose.translation.vector - written.pose.translation.vector).norm() < 2e-9);
-                prop_assert!(read.pose.rotation.angle_to(&written.pose.rotation) < 2e-8);
+                prop_assert!((read.t_world_cam.translation.vector - written.t_world_cam.translation.vector).norm() < 2e-9);
+                prop_assert!(read.t_world_cam.rotation.angle_to(&written.t_world_cam.rotation) < 2e-8);
             }
         }
 

@@ -42,7 +42,7 @@ fn mirrored_ground_truth_has_the_same_pose_for_the_same_image() {
     let backward = Sequence::open(&folder, &SequenceOptions { reverse: true, ..part }).unwrap();
     let mirrored = mirror_trajectory(&truth, backward.mirror.unwrap());
     let nearest = |poses: &[yfslam_io::StampedPose], stamp_ns: i64| {
-        poses.iter().min_by_key(|pose| pose.timestamp_ns.abs_diff(stamp_ns)).unwrap().pose
+        poses.iter().min_by_key(|pose| pose.timestamp_ns.abs_diff(stamp_ns)).unwrap().t_world_cam
     };
     for (frame, again) in forward.entries.iter().zip(backward.entries.iter().rev()) {
         assert_eq!(frame.color_path, again.color_path);

@@ -68,6 +68,12 @@
 //! | `dense` | occupancy, clouds, grids, meshes, images without people |
 //! | `backend`, `worker`, `system` | the owner of the map, threads, the whole path |
 //!
+//! # Features
+//!
+//! | feature | content |
+//! |---|---|
+//! | `persist` (default) | saved maps and dense maps as bytes: [`Slam::save_map`], [`SavedMap::from_bytes`] |
+//!
 //! # Conventions
 //!
 //! `t_a_b` maps points of frame b into frame a. The camera frame has x to the right, y down and z forward; the world is the camera frame
@@ -107,7 +113,9 @@ pub use frame::Frame;
 pub use geometry::Pose;
 pub use image::{DepthImage, Image, ImageError, RgbImage};
 pub use loops::LoopClosure;
-pub use map::{KeyFrame, KeyFrameId, KeyframeRelativePose, Landmark, LandmarkId, Map, MapError};
+#[cfg(feature = "persist")]
+pub use map::MapError;
+pub use map::{KeyFrame, KeyFrameId, KeyframeRelativePose, Landmark, LandmarkId, Map};
 pub use system::{FrameRejected, MapUse, SavedMap, SetupError, Slam, SlamBuilder, StageTimes, Statistics, Tracked};
 pub use tracking::{LostReason, TrackingState};
 pub use worker::Execution;

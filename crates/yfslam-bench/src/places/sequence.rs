@@ -75,7 +75,7 @@ impl LoadedSequence {
         let truth = TrajectoryFile::read(&folder.join("groundtruth.txt"))?.poses;
         let true_pose = |frame: &Frame| {
             let nearest = truth.iter().min_by_key(|pose| pose.timestamp_ns.abs_diff(frame.timestamp_ns))?;
-            (nearest.timestamp_ns.abs_diff(frame.timestamp_ns) <= MAX_DIFFERENCE_NS).then_some(nearest.pose)
+            (nearest.timestamp_ns.abs_diff(frame.timestamp_ns) <= MAX_DIFFERENCE_NS).then_some(nearest.t_world_cam)
         };
         let t_world_cam = frames.iter().map(true_pose).collect();
         let name = folder.file_name().unwrap_or(folder.as_os_str()).to_string_lossy().into_owned();

@@ -208,7 +208,9 @@ fn truth(text: &mut String, path: &Path, sequence: &Sequence) -> Result<()> {
     let path_m: f64 = poses
         .windows(2)
         .map(|w| {
-            w.first().zip(w.last()).map_or(0.0, |(a, b)| (b.pose.translation.vector - a.pose.translation.vector).norm())
+            w.first()
+                .zip(w.last())
+                .map_or(0.0, |(a, b)| (b.t_world_cam.translation.vector - a.t_world_cam.translation.vector).norm())
         })
         .sum();
     writeln!(

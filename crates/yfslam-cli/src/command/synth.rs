@@ -98,7 +98,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
     }
     progress.finish();
     writer.write_text("world.toml", &toml::to_string(&config)?)?;
-    let truth = |index| StampedPose { timestamp_ns: world.timestamp_ns(index), pose: world.pose(index) };
+    let truth = |index| StampedPose::new(world.timestamp_ns(index), world.pose(index));
     writer.finish(&config.camera, config.depth_factor, &(0..world.len()).map(truth).collect::<Vec<_>>(), &boxes)?;
     terminal.result(&format!(
         "{} frames of {} px × {} px, people cover {:.0} % of the image; written to {}\n",

@@ -13,11 +13,11 @@ use crate::ui::terminal::Terminal;
 /// # Errors
 /// The file cannot be read or holds values that are not a pose.
 pub fn read_poses(path: &Path, terminal: Terminal) -> Result<Vec<StampedPose>> {
-    Ok(to_eval(&checked_poses(TrajectoryFile::read(path)?, path, terminal)))
+    Ok(checked_poses(TrajectoryFile::read(path)?, path, terminal))
 }
 
 /// Returns the poses that were read from `path`; warns of those that were left out.
-pub fn checked_poses(file: TrajectoryFile, path: &Path, terminal: Terminal) -> Vec<yfslam_io::StampedPose> {
+pub fn checked_poses(file: TrajectoryFile, path: &Path, terminal: Terminal) -> Vec<StampedPose> {
     let TrajectoryFile { poses, duplicates_skipped, backward_skipped } = file;
     if duplicates_skipped + backward_skipped > 0 {
         terminal.warn(&format!(
@@ -26,9 +26,4 @@ pub fn checked_poses(file: TrajectoryFile, path: &Path, terminal: Terminal) -> V
         ));
     }
     poses
-}
-
-/// Converts poses to the type of the evaluation.
-pub fn to_eval(poses: &[yfslam_io::StampedPose]) -> Vec<StampedPose> {
-    poses.iter().map(|p| StampedPose::new(p.timestamp_ns, p.pose)).collect()
 }

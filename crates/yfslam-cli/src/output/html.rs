@@ -14,7 +14,6 @@ use super::processor_time::processor_time;
 use super::report::ReportedRun;
 use crate::input::boxes::BoxOrigin;
 use crate::input::settings::describe;
-use crate::input::trajectory::to_eval;
 use crate::run::method_run::RunResult;
 use crate::stats::stages::{StageSummary, Stages};
 use crate::ui::command_line::command_line;
@@ -33,7 +32,7 @@ pub fn write(out: &OutputFolder, runs: &[ReportedRun], shared: &Stages) -> Resul
 
 fn page(runs: &[ReportedRun], shared: &Stages) -> Result<String> {
     let Some(first @ ReportedRun { source, truth, .. }) = runs.first() else { return Ok(String::new()) };
-    let trajectories: Vec<Vec<StampedPose>> = runs.iter().map(|r| to_eval(&r.result.outcome.trajectory)).collect();
+    let trajectories: Vec<&[StampedPose]> = runs.iter().map(|r| r.result.outcome.trajectory.as_slice()).collect();
     let boxes = runs.iter().map(|run| run.result.boxes).find(|boxes| !matches!(boxes, BoxOrigin::None));
     let wall_s = runs.iter().map(|r| r.result.outcome.wall.as_secs_f64()).fold(0.0, f64::max);
     let methods = runs.iter().zip(&trajectories).map(|(run, trajectory)| method(run, trajectory));

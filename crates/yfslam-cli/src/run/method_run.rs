@@ -14,7 +14,6 @@ use super::shared_detector::DetectionTally;
 use crate::input::boxes::BoxOrigin;
 use crate::input::detector::LoadedDetector;
 use crate::input::source::{Source, Truth};
-use crate::input::trajectory::to_eval;
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
 
@@ -108,7 +107,7 @@ impl MethodRun {
             let expected = ExpectedFrames::StampsNs(context.source.stamps_ns.clone());
             let EvalContext { max_diff_ns, alignment, .. } = context;
             let options = EvalOptions { max_diff_ns, alignment, expected, ..Default::default() };
-            evaluate_possible(&truth.poses, &to_eval(&outcome.trajectory), options)
+            evaluate_possible(&truth.poses, &outcome.trajectory, options)
         });
         let boxes = if needs_boxes { context.boxes } else { &BoxOrigin::None };
         Ok((RunResult { config, outcome, boxes, shared, evaluation, dense_cost }, dense))

@@ -109,7 +109,7 @@ impl Pipeline {
             self.frames.restart();
         }
         if let Some(pose) = tracked.t_world_cam {
-            self.live.push(StampedPose { timestamp_ns: tracked.timestamp_ns, pose });
+            self.live.push(StampedPose::new(tracked.timestamp_ns, pose));
         } else if self.frames.tracked == 0 {
             self.update_best_start();
         }
@@ -277,7 +277,7 @@ impl Pipeline {
 }
 
 fn stamped((timestamp_ns, pose): (i64, Pose)) -> StampedPose {
-    StampedPose { timestamp_ns, pose }
+    StampedPose::new(timestamp_ns, pose)
 }
 
 impl Outcome {

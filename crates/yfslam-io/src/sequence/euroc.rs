@@ -180,7 +180,7 @@ pub fn parse_ground_truth(text: &str, path: &Path, t_body_cam: &Isometry3<f64>) 
         }
         let rotation = UnitQuaternion::from_quaternion(quaternion);
         let t_world_body = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
-        Ok(StampedPose { timestamp_ns, pose: t_world_body * t_body_cam })
+        Ok(StampedPose::new(timestamp_ns, t_world_body * t_body_cam))
     };
     TrajectoryFile::from_poses(content_lines(text).map(pose).collect::<Result<_>>()?, path)
 }
@@ -228,7 +228,9 @@ mod tests {
         let file = parse_ground_truth(text, Path::new("data.csv"), &t_body_cam).unwrap();
         assert_eq!(file.poses[0].timestamp_ns, 1_403_636_580_838_555_648);
         // Half a turn about y: the camera's z points along the world's −z.
-        assert!((file.poses[0].pose.translation.vector - nalgebra::Vector3::new(4.0, -1.0, -1.5)).norm() < 1e-12);
+        assert!(
+            (file.poses[0].t_world_cam.translation.vector - nalgebra::Vector3::new(4.0, -1.0, -1.5)).norm() < 1e-12
+        );
         let error = parse_ground_truth("1,2,3\n", Path::new("data.csv"), &t_body_cam).unwrap_err().to_string();
         assert!(error.contains("data.csv:1") && error.contains("seven numbers"), "{error}");
     }

@@ -141,7 +141,7 @@ pub fn parse_ground_truth(
         }
         let translation = Translation3::from(Vector3::new(m[3], m[7], m[11]));
         let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&rotation));
-        Ok(StampedPose { timestamp_ns, pose: Isometry3::from_parts(translation, rotation) * t_cam0_cam })
+        Ok(StampedPose::new(timestamp_ns, Isometry3::from_parts(translation, rotation) * t_cam0_cam))
     };
     TrajectoryFile::from_poses(lines.into_iter().zip(stamps_ns).map(pose).collect::<Result<_>>()?, path)
 }
@@ -162,7 +162,7 @@ mod tests {
         assert!((mount.translation.x + 0.0599).abs() < 1e-3 && mount.translation.y.abs() < 2e-3);
         let text = "1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 5 0 1 0 6 0 0 1 8\n";
         let file = parse_ground_truth(text, Path::new("00.txt"), &mount, &[0, 100]).unwrap();
-        assert!((file.poses[1].pose.translation.vector - Vector3::new(4.94, 6.0, 8.0)).norm() < 6e-3);
+        assert!((file.poses[1].t_world_cam.translation.vector - Vector3::new(4.94, 6.0, 8.0)).norm() < 6e-3);
         let error = parse_ground_truth(text, Path::new("00.txt"), &mount, &[0]).unwrap_err().to_string();
         assert!(error.contains("holds 2 poses") && error.contains("1 frames"), "{error}");
         let error =

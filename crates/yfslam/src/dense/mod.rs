@@ -25,6 +25,7 @@ mod mapper;
 mod memory_tests;
 mod mesh;
 mod object_masks;
+#[cfg(feature = "persist")]
 mod persist;
 #[cfg(test)]
 mod scene;
@@ -51,6 +52,7 @@ use nalgebra::UnitQuaternion;
 
 use crate::config::ConfigError;
 use crate::geometry::Pose;
+#[cfg(feature = "persist")]
 use crate::map::persist::MapError;
 
 /// The reasons why a dense map or a product cannot be made.
@@ -132,19 +134,21 @@ pub struct PlacedPatch {
 }
 
 impl DenseMap {
-    /// Returns the map as bytes, for [`DenseMap::from_bytes`].
+    /// Returns the map as bytes, for [`DenseMap::from_bytes`]; with the feature `persist`.
     ///
     /// # Errors
     /// If it cannot be encoded, which would be a fault of this program.
+    #[cfg(feature = "persist")]
     pub fn to_bytes(&self) -> Result<Vec<u8>, MapError> {
         persist::encode(self)
     }
 
-    /// Reads and checks the dense map in `bytes`: a file of its own, or the first part of a saved map.
+    /// Reads and checks the dense map in `bytes`: a file of its own, or the first part of a saved map; with the feature `persist`.
     ///
     /// # Errors
     /// If the bytes are not a dense map, are of another version, truncated, altered or inconsistent, or are a map without a dense
     /// map.
+    #[cfg(feature = "persist")]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, MapError> {
         persist::decode(bytes)
     }

@@ -103,6 +103,7 @@ impl FrameFeatures {
     }
 
     /// Makes frame features of existing features; `descriptors[i]` belongs to `features[i]`.
+    #[cfg(any(test, feature = "persist"))]
     pub(crate) fn from_parts(features: Vec<Feature>, descriptors: Vec<Descriptor>, bounds: ImageBounds) -> Self {
         let mut frame = Self { features, descriptors, bounds, ..Default::default() };
         frame.build_grid();

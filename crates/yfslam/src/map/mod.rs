@@ -11,11 +11,14 @@
 //!    submaps.
 //! 6. Loop edges are mutual; a keyframe with a loop edge is never removed.
 
+#[cfg(feature = "persist")]
 pub(crate) mod container;
 mod keyframe;
 mod landmark;
 pub(crate) mod ops;
+#[cfg(feature = "persist")]
 pub(crate) mod persist;
+#[cfg(feature = "persist")]
 mod restore;
 #[cfg(test)]
 pub(crate) mod scene;
@@ -28,6 +31,7 @@ use slotmap::SlotMap;
 use crate::geometry::{Pose, Similarity, rigid, unscaled, with_scale};
 pub use keyframe::{KeyFrame, KeyFrameId};
 pub use landmark::{Landmark, LandmarkId};
+#[cfg(feature = "persist")]
 pub use persist::MapError;
 
 /// A reference keyframe and the pose of a frame relative to it, `t_cam_keyframe`; the frame follows every correction of the map.

@@ -203,6 +203,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg(feature = "persist")]
     fn a_merged_map_is_read_as_one_submap() {
         let (_, mut map, first, second, other_world) = two_submaps();
         map.merge_submaps(second[3], first[3], &unscaled(&other_world));

@@ -7,8 +7,9 @@ use crate::dynamic::Region;
 use crate::features::Feature;
 use crate::geometry::Pose;
 use crate::loops::LoopClosure;
-use crate::map::persist::{MapError, encode};
 use crate::map::{KeyFrameId, Map};
+#[cfg(feature = "persist")]
+use crate::map::{MapError, persist::encode};
 
 /// Counts over all frames of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -112,10 +113,12 @@ impl Slam {
         self.owner.map()
     }
 
-    /// Returns the map as bytes, with the dense map if there is one, for [`SavedMap::from_bytes`](crate::SavedMap::from_bytes).
+    /// Returns the map as bytes, with the dense map if there is one, for [`SavedMap::from_bytes`](crate::SavedMap::from_bytes); with the
+    /// feature `persist`.
     ///
     /// # Errors
     /// If it cannot be written, which would be a fault of this program.
+    #[cfg(feature = "persist")]
     pub fn save_map(&mut self) -> Result<Vec<u8>, MapError> {
         let mut bytes = match &mut self.dense {
             Some(dense) => dense.snapshot(self.owner.map()).to_bytes()?,

@@ -4,7 +4,9 @@ use crate::camera::Camera;
 use crate::config::FeatureConfig;
 use crate::dense::DenseMap;
 use crate::map::Map;
+#[cfg(feature = "persist")]
 use crate::map::container::DENSE_MAP;
+#[cfg(feature = "persist")]
 use crate::map::persist::{MapError, MapParts, decode};
 
 /// A map with what it was made with.
@@ -18,10 +20,11 @@ pub struct SavedMap {
 }
 
 impl SavedMap {
-    /// Reads a map, and the dense map that was saved with it if there is one, and checks both.
+    /// Reads a map, and the dense map that was saved with it if there is one, and checks both; with the feature `persist`.
     ///
     /// # Errors
     /// If the bytes are no map, of another version, cut, altered, or contradict themselves.
+    #[cfg(feature = "persist")]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, MapError> {
         let MapParts { map, camera, features } = decode(bytes)?;
         let dense = DENSE_MAP.begins(bytes).then(|| DenseMap::from_bytes(bytes)).transpose()?;

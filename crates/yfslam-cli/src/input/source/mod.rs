@@ -18,7 +18,7 @@ use yfslam_io::time::TimeMirror;
 use yfslam_io::trajectory::mirror_trajectory;
 use yfslam_io::{CameraSource, TrajectoryFile};
 
-use crate::input::trajectory::{checked_poses, to_eval};
+use crate::input::trajectory::checked_poses;
 use crate::ui::terminal::Terminal;
 pub use args::SourceArgs;
 pub use folder::open_sequence;
@@ -97,6 +97,6 @@ impl Source {
         if let Some(mirror) = self.mirror {
             poses = mirror_trajectory(&poses, mirror);
         }
-        Ok(Some(Truth { origin: path.display().to_string(), poses: to_eval(&poses) }))
+        Ok(Some(Truth { origin: path.display().to_string(), poses }))
     }
 }
