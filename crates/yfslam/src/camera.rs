@@ -35,6 +35,18 @@ pub struct Camera {
     /// Baseline times `fx`, px·m. For a stereo pair it is measured; for an RGB-D camera it only scales the virtual disparity `bf / z`.
     #[serde(default = "default_bf")]
     pub bf: f64,
+    /// Time from the first to the last row of the colour image, or of each image of a stereo pair, ms: 0 for a global shutter, positive
+    /// if the top row is read first, negative if the bottom row is. `None` if it is not known. The pose of a frame is that of the instant
+    /// at which the row in the middle of the colour image is read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub readout_ms: Option<f64>,
+    /// The same for the depth image. `None`: as for the colour image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_readout_ms: Option<f64>,
+    /// Time from the middle row of the colour image to the middle row of the depth image when both have the same time stamp, ms.
+    /// `None`: 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_delay_ms: Option<f64>,
 }
 
 fn default_fps() -> f64 {
@@ -48,7 +60,20 @@ fn default_bf() -> f64 {
 impl Camera {
     /// Makes a camera without distortion, with 30 frames per second. All arguments are in px.
     pub fn pinhole(width: usize, height: usize, fx: f64, fy: f64, cx: f64, cy: f64) -> Self {
-        Self { width, height, fx, fy, cx, cy, distortion: [0.0; 5], fps: DEFAULT_FPS, bf: DEFAULT_BF }
+        Self {
+            width,
+            height,
+            fx,
+            fy,
+            cx,
+            cy,
+            distortion: [0.0; 5],
+            fps: DEFAULT_FPS,
+            bf: DEFAULT_BF,
+            readout_ms: None,
+            depth_readout_ms: None,
+            depth_delay_ms: None,
+        }
     }
 
     /// Sets the distortion coefficients k1, k2, p1, p2, k3 (OpenCV order).
@@ -69,6 +94,13 @@ impl Camera {
     #[must_use]
     pub fn with_bf(mut self, bf: f64) -> Self {
         self.bf = bf;
+        self
+    }
+
+    /// Sets the time from the first to the last row of an image, ms; 0 for a global shutter.
+    #[must_use]
+    pub fn with_readout_ms(mut self, readout_ms: f64) -> Self {
+        self.readout_ms = Some(readout_ms);
         self
     }
 

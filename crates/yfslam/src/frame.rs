@@ -16,6 +16,8 @@ pub struct Frame {
     pub color: Arc<RgbImage>,
     /// Depth, registered to the colour image: same size, same pixel grid.
     pub depth: Option<Arc<DepthImage>>,
+    /// Time of the depth image, ns, where it has a time stamp of its own; else it is taken for that of the colour image.
+    pub depth_timestamp_ns: Option<i64>,
     /// The right image of a rectified stereo pair, same size: a point at depth z lies `bf / z` px further left in it, in the same row.
     pub right: Option<Arc<RgbImage>>,
     /// Detections of movable objects that are known already, whatever their class. `Some` replaces the run of the system's own detector
@@ -38,7 +40,15 @@ impl Frame {
 
     /// Makes the frame of a single camera.
     pub fn mono(timestamp_ns: i64, color: impl Into<Arc<RgbImage>>) -> Self {
-        Self { timestamp_ns, color: color.into(), depth: None, right: None, detections: None, mask: None }
+        let color = color.into();
+        Self { timestamp_ns, color, depth: None, depth_timestamp_ns: None, right: None, detections: None, mask: None }
+    }
+
+    /// Sets the time of the depth image, where its sensor is not triggered together with the colour sensor.
+    #[must_use]
+    pub fn with_depth_timestamp(mut self, timestamp_ns: i64) -> Self {
+        self.depth_timestamp_ns = Some(timestamp_ns);
+        self
     }
 
     /// Adds detections of movable objects from another source.

@@ -8,6 +8,9 @@ use crate::error::{Error, Result};
 /// Largest side of an image, px.
 const MAX_SIDE: usize = 16_384;
 
+/// Longest time that a sensor takes to read its rows, ms: more than any camera for video needs.
+const MAX_READOUT_MS: f64 = 100.0;
+
 /// Largest error after undistorting and distorting a point, px. Above it the distortion cannot be inverted.
 const MAX_ROUND_TRIP_PX: f64 = 0.5;
 
@@ -33,6 +36,15 @@ pub fn check_camera(source: &CameraSource) -> Result<()> {
     ];
     for (name, value, cure) in positive {
         if !(value.is_finite() && value > 0.0) {
+            return refuse(format!("{name} is {value}"), cure);
+        }
+    }
+    let Camera { readout_ms, depth_readout_ms, depth_delay_ms, .. } = *camera;
+    let times =
+        [("readout_ms", readout_ms), ("depth_readout_ms", depth_readout_ms), ("depth_delay_ms", depth_delay_ms)];
+    for (name, value) in times {
+        if let Some(value) = value.filter(|value| value.is_nan() || value.abs() > MAX_READOUT_MS) {
+            let cure = "give milliseconds between -100 and 100, 0 for a global shutter, or leave the key out: it is then estimated";
             return refuse(format!("{name} is {value}"), cure);
         }
     }

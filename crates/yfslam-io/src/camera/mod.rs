@@ -99,6 +99,9 @@ struct CameraKeys {
     depth_factor: f64,
     fps: Option<f64>,
     bf: Option<f64>,
+    readout_ms: Option<f64>,
+    depth_readout_ms: Option<f64>,
+    depth_delay_ms: Option<f64>,
 }
 
 /// Parses a camera from TOML and refuses unknown keys.
@@ -109,13 +112,16 @@ pub fn parse_toml(text: &str, path: &Path) -> Result<CameraSource> {
     let keys: CameraKeys = toml::from_str(text).map_err(|error| {
         let start = error.span().map_or(0, |span| span.start);
         let line = 1 + text.bytes().take(start).filter(|&byte| byte == b'\n').count();
-        let cure = "the keys are width, height, fx, fy, cx, cy, depth_factor and, optionally, distortion, fps, bf";
+        let cure = "the keys are width, height, fx, fy, cx, cy, depth_factor and, optionally, distortion, fps, bf, readout_ms, depth_readout_ms, depth_delay_ms";
         Error::line(path, line, error.message(), cure)
     })?;
     let mut camera = Camera::pinhole(keys.width, keys.height, keys.fx, keys.fy, keys.cx, keys.cy);
     camera.distortion = keys.distortion;
     camera.fps = keys.fps.unwrap_or(camera.fps);
     camera.bf = keys.bf.unwrap_or(camera.bf);
+    camera.readout_ms = keys.readout_ms;
+    camera.depth_readout_ms = keys.depth_readout_ms;
+    camera.depth_delay_ms = keys.depth_delay_ms;
     let (depth_factor, origin) = (keys.depth_factor, path.display().to_string());
     Ok(CameraSource { camera, depth_factor, origin, unused_keys: vec![] })
 }

@@ -115,6 +115,8 @@ impl Iterator for FrameStream {
         let frame = color.image.and_then(|color| {
             let (depth, right) = paired?;
             let mut frame = Frame::mono(timestamp_ns, color);
+            frame.depth_timestamp_ns =
+                entry.paired_image.as_ref().filter(|_| depth.is_some()).map(|image| image.stamp_ns);
             (frame.depth, frame.right) = (depth, right);
             Ok(frame)
         });

@@ -178,7 +178,10 @@ fn check_map(saved: &SavedMap, map_use: MapUse, context: &Context) -> Result<(),
             wanted_scale: wanted.scale_factor,
         });
     }
-    if map_use == MapUse::Extend && saved.camera != context.sensor.camera {
+    // The features of a map are those of a global shutter, whatever the camera's is.
+    let Camera { readout_ms, depth_readout_ms, depth_delay_ms, .. } = saved.camera;
+    let camera = Camera { readout_ms, depth_readout_ms, depth_delay_ms, ..context.sensor.camera.clone() };
+    if map_use == MapUse::Extend && saved.camera != camera {
         return Err(SetupError::MapCamera(saved.camera.width, saved.camera.fx));
     }
     if context.sensor.measures_depth && saved.map.keyframe_count() > 0 && !saved.map.has_depths() {
