@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::{Backend, Inserted};
+use crate::features::rolling_shutter::Velocity;
 use crate::image::RgbImage;
 use crate::loops::{GlobalBundle, PlaceRecogniser};
 use crate::map::{KeyFrameId, Map};
@@ -27,6 +28,8 @@ enum Request {
     Insert(Box<TrackedFrame>, Arc<RgbImage>),
     Begin(Box<TwoViewMap>),
     Count(ObservationCounts),
+    /// Velocity of the frame of that time.
+    Retime(i64, Velocity),
     /// The adjustment of that number has finished, or has ended by a panic.
     Adjusted(u64, Option<Box<GlobalBundle>>),
     RemoveSubmap(KeyFrameId),
@@ -148,6 +151,10 @@ impl MappingWorker {
         }
     }
 
+    pub(super) fn retime(&mut self, timestamp_ns: i64, velocity: &Velocity) {
+        self.send(Request::Retime(timestamp_ns, *velocity));
+    }
+
     pub(super) fn remove_submap(&mut self, root: KeyFrameId) {
         self.send(Request::RemoveSubmap(root));
     }
@@ -209,6 +216,10 @@ impl Mapping {
             }
             Request::Count(counts) => {
                 self.backend.count(&counts);
+                return None;
+            }
+            Request::Retime(timestamp_ns, velocity) => {
+                self.backend.retime(timestamp_ns, &velocity);
                 return None;
             }
             Request::RemoveSubmap(root) => {

@@ -10,10 +10,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::context::Context;
+use crate::features::rolling_shutter::Velocity;
 use crate::image::RgbImage;
 use crate::loops::{GlobalBundle, LoopCloser, LoopClosure, PlaceRecogniser};
 use crate::map::{KeyFrameId, Map};
-use crate::mapping::Mapper;
+use crate::mapping::{Mapper, retime};
 use crate::tracking::{ObservationCounts, TrackedFrame, TwoViewMap};
 use crate::worker::Execution;
 use mapping_worker::MappingWorker;
@@ -39,6 +40,8 @@ pub(crate) struct Backend {
     mapper: Mapper,
     recogniser: Arc<Mutex<PlaceRecogniser>>,
     loops: LoopCloser,
+    /// The keyframe inserted last.
+    latest: Option<KeyFrameId>,
 }
 
 impl Backend {
@@ -49,7 +52,7 @@ impl Backend {
             recogniser.add_keyframe(&map, id);
         }
         let recogniser = Arc::new(Mutex::new(recogniser));
-        Self { context, map, mapper: Mapper::default(), recogniser, loops: LoopCloser::default() }
+        Self { context, map, mapper: Mapper::default(), recogniser, loops: LoopCloser::default(), latest: None }
     }
 
     /// Place recognition, shared with relocalisation.
@@ -61,6 +64,7 @@ impl Backend {
     fn insert(&mut self, frame: &TrackedFrame, color: &RgbImage) -> Inserted {
         let started = Instant::now();
         let keyframe = self.mapper.insert(&self.context, &mut self.map, frame, color);
+        self.latest = Some(keyframe);
         let mapping = started.elapsed();
         // A panic elsewhere left the index usable: at worst it lacks a landmark.
         self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).add_keyframe(&self.map, keyframe);
@@ -75,8 +79,18 @@ impl Backend {
     fn begin(&mut self, start: &TwoViewMap) -> Inserted {
         let started = Instant::now();
         let keyframe = self.mapper.begin(&self.context.sensor, &mut self.map, start);
+        self.latest = Some(keyframe);
         self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).add_keyframe(&self.map, keyframe);
         Inserted { keyframe, loop_closure: None, mapping: started.elapsed(), loops: Duration::ZERO }
+    }
+
+    /// Corrects the keyframe inserted last for the velocity that the next frame showed, if it is the frame of that time.
+    fn retime(&mut self, timestamp_ns: i64, velocity: &Velocity) {
+        if let Some(latest) = self.latest
+            && self.map.keyframe(latest).is_some_and(|k| k.timestamp_ns == timestamp_ns)
+        {
+            retime(&self.context, &mut self.map, latest, velocity);
+        }
     }
 
     /// Adjusts the whole submap of a keyframe.
@@ -174,6 +188,14 @@ impl MapOwner {
                 worker.begin(start);
                 worker.wait()
             }
+        }
+    }
+
+    /// Corrects the keyframe of that time for its velocity, if it was inserted last.
+    pub(crate) fn retime(&mut self, timestamp_ns: i64, velocity: &Velocity) {
+        match self {
+            Self::Inline(backend) => backend.retime(timestamp_ns, velocity),
+            Self::Threaded(worker) => worker.retime(timestamp_ns, velocity),
         }
     }
 

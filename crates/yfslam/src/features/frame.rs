@@ -3,7 +3,9 @@
 //! In: keypoints and descriptors of the grey image, the depth image, the camera. Out: [`FrameFeatures`].
 
 use crate::camera::Camera;
+use crate::features::rolling_shutter::{FrameTimes, Measured, Velocity};
 use crate::features::{Descriptor, Features};
+use crate::geometry::Pinhole;
 use crate::image::DepthImage;
 
 /// Columns of the search grid. Source: ORB-SLAM2.
@@ -41,6 +43,8 @@ pub struct FrameFeatures {
     /// Feature indices ordered by grid cell; cell `c` has `order[start[c]..start[c + 1]]`.
     order: Vec<u32>,
     start: Vec<u32>,
+    /// The features as they were measured at the times of their rows; empty if the shutter is global.
+    measured: Vec<Measured>,
 }
 
 /// Extent of the undistorted image, px.
@@ -99,6 +103,46 @@ impl FrameFeatures {
                 trust: 1.0,
             }
         }));
+        self.measured.clear();
+        self.build_grid();
+    }
+
+    /// Keeps positions and depths as they are now, as those measured at the times of their rows.
+    pub(crate) fn keep_measured(&mut self, times: &FrameTimes) {
+        self.measured.clear();
+        self.measured.extend(self.features.iter().map(|f| {
+            let seconds = times.color.seconds(f64::from(f.raw[1])) as f32;
+            Measured { u: f.u, v: f.v, depth_m: f.depth_m, seconds, depth_seconds: seconds }
+        }));
+    }
+
+    /// Looks up the depths where the depth image shows the features, for a camera with that velocity.
+    pub(crate) fn measure_depths(
+        &mut self,
+        times: &FrameTimes,
+        velocity: &Velocity,
+        camera: &Camera,
+        depth: &DepthImage,
+    ) {
+        for (feature, measured) in self.features.iter().zip(&mut self.measured) {
+            measured.measure_depth(f64::from(feature.raw[1]), times, velocity, camera, depth);
+        }
+    }
+
+    /// Brings all features to the time of the middle row, for a camera with that velocity. Does nothing without
+    /// [`FrameFeatures::keep_measured`]. `depth_of` a feature stands for a depth that was not measured, m.
+    pub(crate) fn to_middle_row(&mut self, velocity: &Velocity, pinhole: &Pinhole, depth_of: impl Fn(usize) -> f64) {
+        if self.measured.is_empty() {
+            return;
+        }
+        for (i, (feature, measured)) in self.features.iter_mut().zip(&self.measured).enumerate() {
+            let point = measured.point(velocity, pinhole, depth_of(i));
+            if point.z > 0.0 {
+                let [u, v] = pinhole.project(&point);
+                (feature.u, feature.v) = (u as f32, v as f32);
+                feature.depth_m = measured.depth_m.map(|_| point.z as f32);
+            }
+        }
         self.build_grid();
     }
 

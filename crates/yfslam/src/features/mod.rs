@@ -11,6 +11,7 @@ pub(crate) mod matching;
 mod orb;
 mod orientation;
 mod pattern;
+pub(crate) mod rolling_shutter;
 pub(crate) mod stereo;
 pub(crate) mod stereo_worker;
 

@@ -4,7 +4,8 @@ use nalgebra::{Point3, Vector3};
 use slotmap::SecondaryMap;
 
 use crate::features::FrameFeatures;
-use crate::geometry::{Pose, Similarity, rigid};
+use crate::features::rolling_shutter::Velocity;
+use crate::geometry::{Pinhole, Pose, Similarity, rigid};
 use crate::map::{KeyFrame, KeyFrameId, Landmark, LandmarkId, Map};
 
 /// Number of shared landmarks from which two keyframes are covisible. Source: ORB-SLAM2.
@@ -164,6 +165,19 @@ impl Map {
     pub(crate) fn set_position(&mut self, landmark: LandmarkId, position: Point3<f64>) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.position = position;
+        }
+    }
+
+    /// Brings the features of a keyframe to the time of their middle row; see [`FrameFeatures::to_middle_row`].
+    pub(crate) fn retime_features(
+        &mut self,
+        keyframe: KeyFrameId,
+        velocity: &Velocity,
+        pinhole: &Pinhole,
+        depth_of: impl Fn(usize) -> f64,
+    ) {
+        if let Some(k) = self.keyframes.get_mut(keyframe) {
+            k.features.to_middle_row(velocity, pinhole, depth_of);
         }
     }
 

@@ -6,6 +6,7 @@
 mod cull;
 mod depth;
 pub(crate) mod fuse;
+mod retime;
 mod triangulate;
 mod window;
 
@@ -13,6 +14,7 @@ use crate::context::{Context, SensorModel};
 use crate::image::RgbImage;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::tracking::{StartFrame, TrackedFrame, TwoViewMap};
+pub(crate) use retime::retime;
 pub(crate) use window::Window;
 
 /// Local mapping.

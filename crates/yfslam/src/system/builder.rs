@@ -12,6 +12,7 @@ use crate::detect::Detector;
 use crate::detect::detector_worker::DetectorWorker;
 use crate::detect::roll_compensation::GravityDirection;
 use crate::dynamic::{DynamicFilter, filter_for};
+use crate::features::rolling_shutter::FrameTimes;
 use crate::features::stereo_worker::{METRES_PER_UNIT, StereoWorker};
 use crate::features::{Features, OrbExtractor};
 use crate::image::{DepthImage, GrayImage, Image};
@@ -138,6 +139,7 @@ impl SlamBuilder {
             context,
             extractor,
             gray: GrayImage::default(),
+            frame_times: FrameTimes::new(&camera),
             stereo,
             sparse_depth: Arc::new(DepthImage {
                 raw: Image::new(camera.width, camera.height),

@@ -4,7 +4,7 @@ use std::sync::PoisonError;
 
 use nalgebra::Point3;
 
-use super::{MapUse, Pass, Slam};
+use super::{Anchor, MapUse, Pass, Slam};
 use crate::frame::Frame;
 use crate::image::DepthImage;
 use crate::loops::{SearchRegion, relocalise};
@@ -26,9 +26,12 @@ impl Slam {
             TrackingState::Lost => self.relocalise_frame(pass),
         };
         self.owner.count(&mut self.tracker.observation_counts);
+        if localised.is_ok() {
+            self.correct_last_frame();
+        }
         let (config, was_tracking) = (&self.context.config.dynamic, self.state == TrackingState::Tracking);
         if localised.is_ok() {
-            self.tracker.accept(self.owner.map());
+            self.tracker.accept(&self.context, self.owner.map());
             self.gravity.add(&self.tracker.current.t_cam_world);
             if let Some(relative_pose) = self.tracker.current.reference {
                 self.filter.end_frame(config, frame.timestamp_ns, relative_pose);
@@ -47,9 +50,9 @@ impl Slam {
     fn track_frame(&mut self, depth: &DepthImage) -> Result<(), LostReason> {
         let min_inliers = self.context.config.tracking.local_min_inliers;
         let filter = self.filter.as_mut();
-        let first = self.tracker.track(&self.context, self.owner.map(), filter, min_inliers);
+        let first = self.tracker.track(&self.context, self.owner.map(), filter, depth, min_inliers);
         if let Err(reason) = first
-            && !self.track_with_doubted_boxes()
+            && !self.track_with_doubted_boxes(depth)
         {
             return Err(reason);
         }
@@ -61,18 +64,32 @@ impl Slam {
 
     /// Tracks such a frame also by the features that boxes exclude: a false box that fills the image must not lose the camera. People
     /// who are really there have no landmarks in the map.
-    fn track_with_doubted_boxes(&mut self) -> bool {
+    fn track_with_doubted_boxes(&mut self, depth: &DepthImage) -> bool {
         let config = &self.context.config;
         // The same certainty as for a camera that was lost.
         let min_inliers = config.place_recognition.relocalise_min_inliers;
         let filter = self.filter.as_mut();
         let tracked = filter.doubt_boxes(&config.dynamic, &mut self.tracker.current.features)
-            && self.tracker.track(&self.context, self.owner.map(), filter, min_inliers).is_ok();
+            && self.tracker.track(&self.context, self.owner.map(), filter, depth, min_inliers).is_ok();
         self.tracker.current.settle_doubts();
         if tracked {
             self.filter.settle_doubts(&config.dynamic, &self.tracker.current.features);
         }
         tracked
+    }
+
+    /// Takes over what the frame has shown about the velocity of the last one: its pose, and the features of a keyframe.
+    fn correct_last_frame(&mut self) {
+        let Some(velocity) = self.tracker.last_velocity else { return };
+        let (timestamp_ns, relative_pose) = self.tracker.last_pose();
+        if let (Some(anchor), Some((reference, t_cam_reference))) = (self.anchors.last_mut(), relative_pose)
+            && anchor.timestamp_ns == timestamp_ns
+        {
+            *anchor = Anchor { timestamp_ns, reference, t_cam_reference };
+        }
+        if self.tracker.last_was_keyframe() && !self.is_map_frozen() {
+            self.owner.retime(timestamp_ns, &velocity);
+        }
     }
 
     /// Searches the whole map for the place that the frame shows, and tracks the frame there.

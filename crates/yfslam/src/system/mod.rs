@@ -21,6 +21,7 @@ use crate::dense::DenseMapper;
 use crate::detect::detector_worker::DetectorWorker;
 use crate::detect::roll_compensation::GravityDirection;
 use crate::dynamic::DynamicFilter;
+use crate::features::rolling_shutter::FrameTimes;
 use crate::features::stereo_worker::StereoWorker;
 use crate::features::{Features, OrbExtractor};
 use crate::frame::Frame;
@@ -43,6 +44,8 @@ pub struct Slam {
     context: Arc<Context>,
     extractor: OrbExtractor,
     gray: GrayImage,
+    /// When the rows of the images of a frame are read.
+    frame_times: FrameTimes,
     /// Matches right images, where depth comes from stereo.
     stereo: Option<StereoWorker>,
     /// The depth image of a camera that has none, or whose depth is not used: zero, but around features that have a depth from stereo.

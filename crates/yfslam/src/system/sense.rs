@@ -151,6 +151,11 @@ impl Slam {
         if let (Some(stereo), Some(sparse)) = (&mut self.stereo, Arc::get_mut(&mut self.sparse_depth)) {
             stereo.finish(&self.extractor, &self.extracted, &mut current.features, sparse);
         }
+        let depth_after = measured.and(frame.depth_timestamp_ns).map_or(0, |ns| ns.saturating_sub(frame.timestamp_ns));
+        current.times = self.frame_times.with_depth_after(depth_after as f64 * 1e-9);
+        if !current.times.is_instant() {
+            current.features.keep_measured(&current.times);
+        }
         current.clear_matches();
     }
 

@@ -5,6 +5,7 @@
 
 pub(crate) mod keyframe_policy;
 mod local_map;
+mod motion;
 pub(crate) mod search;
 mod state;
 mod tracked_frame;
@@ -14,11 +15,13 @@ mod visibility_check;
 use crate::context::Context;
 use crate::dynamic::{DynamicFilter, FirstPose};
 use crate::features::matching::RotationHistogram;
+use crate::features::rolling_shutter::Velocity;
 use crate::geometry::Pose;
 use crate::image::DepthImage;
-use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::map::{KeyFrameId, KeyframeRelativePose, LandmarkId, Map};
 use keyframe_policy::{FrameSummary, is_keyframe_wanted};
 use local_map::LocalMap;
+use motion::Interval;
 use search::{search_keyframe, search_last_frame, search_local_map};
 pub use state::{LostReason, TrackingState};
 pub(crate) use tracked_frame::{Match, TrackedFrame};
@@ -53,6 +56,12 @@ pub(crate) struct Tracker {
     last: TrackedFrame,
     /// Motion from the last frame to the current one, `t_current_last`; `None` after initialisation or when tracking was lost.
     velocity: Option<Pose>,
+    /// Whether the pose of the last frame is known.
+    last_is_tracked: bool,
+    /// Motion between the last two frames, if both poses are known.
+    interval: Option<Interval>,
+    /// Velocity of the last frame, with which it was corrected after the current one was tracked.
+    pub last_velocity: Option<Velocity>,
     local_map: LocalMap,
     /// Landmarks expected in view of the current frame, sorted.
     visible: Vec<LandmarkId>,
@@ -72,6 +81,7 @@ impl Tracker {
     pub(crate) fn begin_frame(&mut self, timestamp_ns: i64) {
         std::mem::swap(&mut self.current, &mut self.last);
         self.current.begin(timestamp_ns);
+        self.last_velocity = None;
         self.frames_since_keyframe += 1;
     }
 
@@ -90,17 +100,61 @@ impl Tracker {
         context: &Context,
         map: &Map,
         filter: &mut dyn DynamicFilter,
+        depth: &DepthImage,
         min_inliers: usize,
     ) -> Result<(), LostReason> {
+        self.correct_shutter(context, self.interval.map(|interval| interval.mean()), Some(depth));
         if !self.estimate_first_pose(context, map) {
             return Err(LostReason::TooFewMatches);
         }
+        self.correct_shutter(context, self.current_velocity(context), Some(depth));
         let first = FirstPose { sensor: &context.sensor, map, t_cam_world: &self.current.t_cam_world };
         if filter.after_pose(&context.config.dynamic, &first, &mut self.current.features) {
             self.current.drop_distrusted();
             self.current.refine_pose(context);
         }
-        self.track_local_map(context, map, min_inliers)
+        self.track_local_map(context, map, min_inliers)?;
+        if !self.current.times.is_instant() {
+            self.correct_shutter(context, self.current_velocity(context), None);
+            self.inliers = self.current.refine_pose(context);
+            self.correct_last(context, map);
+        }
+        Ok(())
+    }
+
+    /// Motion from the last frame to the current one, if both poses are known.
+    fn current_interval(&self, context: &Context) -> Option<Interval> {
+        let seconds = (self.current.timestamp_ns - self.last.timestamp_ns) as f64 * 1e-9;
+        let max_gap_s = context.config.tracking.max_gap_s;
+        let (last, current) = (&self.last.t_cam_world, &self.current.t_cam_world);
+        Interval::between(last, current, seconds, max_gap_s).filter(|_| self.last_is_tracked)
+    }
+
+    /// Velocity of the current frame, from its pose and the last two.
+    fn current_velocity(&self, context: &Context) -> Option<Velocity> {
+        Some(self.current_interval(context)?.at_end(self.interval.as_ref()))
+    }
+
+    /// Brings the features of the current frame to the time of the middle row.
+    fn correct_shutter(&mut self, context: &Context, velocity: Option<Velocity>, depth: Option<&DepthImage>) {
+        if let Some(velocity) = velocity.filter(|_| !self.current.times.is_instant()) {
+            self.current.correct_shutter(&context.sensor, &velocity, depth);
+        }
+    }
+
+    /// Corrects the last frame for its velocity, which is known better now, and refines its pose.
+    fn correct_last(&mut self, context: &Context, map: &Map) {
+        let Some(next) = self.current_interval(context) else { return };
+        let velocity = self.interval.map_or(next.mean(), |interval| interval.at_joint(&next));
+        self.last.drop_odometry_points();
+        self.last.correct_shutter(&context.sensor, &velocity, None);
+        self.last_velocity = Some(velocity);
+        if !self.last_was_keyframe() && self.last.match_count() > 0 {
+            self.last.refine_pose(context);
+            if let Some((reference, _)) = self.last.reference {
+                self.last.set_reference(reference, map);
+            }
+        }
     }
 
     /// Estimates the first pose from the last frame or, if that fails, from the reference keyframe. Returns whether it succeeded.
@@ -156,12 +210,8 @@ impl Tracker {
         min_inliers: usize,
     ) -> Result<(), LostReason> {
         let c = &context.config.tracking;
-        for matched in &mut self.current.matches {
-            // Visual odometry points help the first pose only; the refined pose depends on the map alone.
-            if matched.is_some_and(|m| m.landmark.is_none()) {
-                *matched = None;
-            }
-        }
+        // Visual odometry points help the first pose only; the refined pose depends on the map alone.
+        self.current.drop_odometry_points();
         if let Some(reference) = self.local_map.update(c, map, &self.current) {
             self.reference = Some(reference);
         }
@@ -201,8 +251,10 @@ impl Tracker {
     }
 
     /// Ends a tracked frame: updates the constant-velocity model and the pose relative to the reference keyframe.
-    pub(crate) fn accept(&mut self, map: &Map) {
+    pub(crate) fn accept(&mut self, context: &Context, map: &Map) {
         self.velocity = self.last.reference.map(|_| self.current.t_cam_world * self.last.t_cam_world.inverse());
+        self.interval = self.current_interval(context);
+        self.last_is_tracked = true;
         if let Some(reference) = self.reference {
             self.current.set_reference(reference, map);
         }
@@ -211,15 +263,28 @@ impl Tracker {
     /// Resets the constant-velocity model, because the pose of the last frame is not suited to measure the motion.
     pub(crate) fn reset_velocity(&mut self) {
         self.velocity = None;
+        self.interval = None;
     }
 
     /// Ends a frame that could not be tracked: it keeps the pose of the last one.
     pub(crate) fn reject(&mut self) {
         self.velocity = None;
+        self.interval = None;
+        self.last_is_tracked = false;
         self.current.clear_matches();
         self.current.t_cam_world = self.last.t_cam_world;
         self.current.reference = self.last.reference;
         self.inliers = 0;
+    }
+
+    /// Returns time and relative pose of the last frame.
+    pub(crate) fn last_pose(&self) -> (i64, Option<KeyframeRelativePose>) {
+        (self.last.timestamp_ns, self.last.reference)
+    }
+
+    /// Returns whether the last frame became a keyframe.
+    pub(crate) fn last_was_keyframe(&self) -> bool {
+        self.frames_since_keyframe == 1
     }
 
     /// Returns whether the current frame should become a keyframe.
@@ -259,6 +324,8 @@ impl Tracker {
     /// Resets everything except the buffers.
     pub(crate) fn reset(&mut self) {
         self.velocity = None;
+        self.interval = None;
+        self.last_is_tracked = false;
         self.reference = None;
         self.frames_since_keyframe = 0;
         self.observation_counts.clear();

@@ -6,9 +6,14 @@ use nalgebra::{Matrix6, Point3};
 
 use crate::context::{Context, SensorModel};
 use crate::features::FrameFeatures;
+use crate::features::rolling_shutter::{FrameTimes, Velocity};
 use crate::geometry::Pose;
+use crate::image::DepthImage;
 use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
 use crate::optimize::pose_only::{PoseObservation, optimize_pose, pose_covariance};
+
+/// Depth of points in a frame in which none is known, m: so far that only rotations move them.
+const UNKNOWN_DEPTH_M: f64 = 1e3;
 
 /// The point to which a feature is matched: a landmark or a visual odometry point.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +38,8 @@ impl Match {
 pub(crate) struct TrackedFrame {
     /// Time of the frame, ns.
     pub timestamp_ns: i64,
+    /// When the rows of its images are read.
+    pub times: FrameTimes,
     /// Features.
     pub features: FrameFeatures,
     /// Match of each feature.
@@ -46,6 +53,8 @@ pub(crate) struct TrackedFrame {
     observed: Vec<u32>,
     /// Depth and index of unmatched features.
     nearest: Vec<(f32, u32)>,
+    /// Depths of the matched points, m.
+    depths: Vec<f64>,
 }
 
 impl TrackedFrame {
@@ -86,6 +95,37 @@ impl TrackedFrame {
         for (matched, feature) in self.matches.iter().zip(&mut self.features.features) {
             if feature.trust < 1.0 && matched.is_none() {
                 feature.trust = 0.0;
+            }
+        }
+    }
+
+    /// Brings the features to the time of the middle row, for a camera with that velocity; looks their depths up in `depth` before, if it is
+    /// given. Depths that were not measured are those of the
+    /// matched points, or the median of these.
+    pub(crate) fn correct_shutter(&mut self, sensor: &SensorModel, velocity: &Velocity, depth: Option<&DepthImage>) {
+        if let Some(depth) = depth {
+            self.features.measure_depths(&self.times, velocity, &sensor.camera, depth);
+        }
+        let pose = &self.t_cam_world;
+        let depth_of = |matched: &Match| (pose * matched.point_world).z;
+        self.depths.clear();
+        self.depths.extend(self.matches.iter().flatten().map(depth_of));
+        let middle = self.depths.len() / 2;
+        let median = match self.depths.is_empty() {
+            true => UNKNOWN_DEPTH_M,
+            false => *self.depths.select_nth_unstable_by(middle, f64::total_cmp).1,
+        };
+        let matches = &self.matches;
+        self.features.to_middle_row(velocity, &sensor.pinhole, |i| {
+            matches.get(i).and_then(Option::as_ref).map(depth_of).filter(|z| *z > 0.0).unwrap_or(median)
+        });
+    }
+
+    /// Removes the matches with visual odometry points.
+    pub(crate) fn drop_odometry_points(&mut self) {
+        for matched in &mut self.matches {
+            if matched.is_some_and(|m| m.landmark.is_none()) {
+                *matched = None;
             }
         }
     }
