@@ -43,8 +43,10 @@ pub struct FrameFeatures {
     /// Feature indices ordered by grid cell; cell `c` has `order[start[c]..start[c + 1]]`.
     order: Vec<u32>,
     start: Vec<u32>,
-    /// The features as they were measured at the times of their rows; empty if the shutter is global.
+    /// The features as they were measured at the times of their rows; empty for a camera that is known to show one instant.
     measured: Vec<Measured>,
+    times: FrameTimes,
+    velocity: Option<Velocity>,
 }
 
 /// Extent of the undistorted image, px.
@@ -104,39 +106,37 @@ impl FrameFeatures {
             }
         }));
         self.measured.clear();
+        self.times = FrameTimes::default();
+        self.velocity = None;
         self.build_grid();
     }
 
     /// Keeps positions and depths as they are now, as those measured at the times of their rows.
-    pub(crate) fn keep_measured(&mut self, times: &FrameTimes) {
+    pub(crate) fn keep_measured(&mut self, times: FrameTimes) {
+        self.times = times;
         self.measured.clear();
         self.measured.extend(self.features.iter().map(|f| {
-            let seconds = times.color.seconds(f64::from(f.raw[1])) as f32;
-            Measured { u: f.u, v: f.v, depth_m: f.depth_m, seconds, depth_seconds: seconds }
+            let row = f.raw[1];
+            Measured { u: f.u, v: f.v, row, depth_m: f.depth_m, depth_row: row }
         }));
     }
 
     /// Looks up the depths where the depth image shows the features, for a camera with that velocity.
-    pub(crate) fn measure_depths(
-        &mut self,
-        times: &FrameTimes,
-        velocity: &Velocity,
-        camera: &Camera,
-        depth: &DepthImage,
-    ) {
-        for (feature, measured) in self.features.iter().zip(&mut self.measured) {
-            measured.measure_depth(f64::from(feature.raw[1]), times, velocity, camera, depth);
+    pub(crate) fn measure_depths(&mut self, velocity: &Velocity, camera: &Camera, depth: &DepthImage) {
+        for measured in &mut self.measured {
+            measured.measure_depth(&self.times, velocity, camera, depth);
         }
     }
 
-    /// Brings all features to the time of the middle row, for a camera with that velocity. Does nothing without
-    /// [`FrameFeatures::keep_measured`]. `depth_of` a feature stands for a depth that was not measured, m.
+    /// Brings all features to the time of the middle row, for a camera with that velocity. `depth_of` a feature stands for a depth that
+    /// was not measured, m.
     pub(crate) fn to_middle_row(&mut self, velocity: &Velocity, pinhole: &Pinhole, depth_of: impl Fn(usize) -> f64) {
-        if self.measured.is_empty() {
+        self.velocity = Some(*velocity);
+        if self.times.is_instant() {
             return;
         }
         for (i, (feature, measured)) in self.features.iter_mut().zip(&self.measured).enumerate() {
-            let point = measured.point(velocity, pinhole, depth_of(i));
+            let point = measured.point(&self.times, velocity, pinhole, depth_of(i));
             if point.z > 0.0 {
                 let [u, v] = pinhole.project(&point);
                 (feature.u, feature.v) = (u as f32, v as f32);
@@ -144,6 +144,31 @@ impl FrameFeatures {
             }
         }
         self.build_grid();
+    }
+
+    /// Returns whether the features are kept as they were measured.
+    pub(crate) fn keeps_measured(&self) -> bool {
+        !self.measured.is_empty()
+    }
+
+    /// When the rows of the images are read.
+    pub(crate) fn times(&self) -> &FrameTimes {
+        &self.times
+    }
+
+    /// Sets how the rows of the colour image and of the depth image are read, once that is known.
+    pub(crate) fn set_row_times(&mut self, times: &FrameTimes) {
+        (self.times.color, self.times.depth) = (times.color, times.depth);
+    }
+
+    /// The velocity to which the features were corrected last.
+    pub(crate) fn velocity(&self) -> Option<&Velocity> {
+        self.velocity.as_ref()
+    }
+
+    /// Returns a feature as it was measured, if that was kept.
+    pub(crate) fn measured(&self, feature: usize) -> Option<&Measured> {
+        self.measured.get(feature)
     }
 
     /// Makes frame features of existing features; `descriptors[i]` belongs to `features[i]`.

@@ -85,12 +85,12 @@ pub(crate) struct Measured {
     pub u: f32,
     /// Undistorted row, px.
     pub v: f32,
+    /// Row of the distorted colour image, px.
+    pub row: f32,
     /// Depth, m, at the time at which it was measured.
     pub depth_m: Option<f32>,
-    /// Time of the position, s.
-    pub seconds: f32,
-    /// Time of the depth, s.
-    pub depth_seconds: f32,
+    /// Row of the depth image in which it was measured, px.
+    pub depth_row: f32,
 }
 
 /// Returns where a point that is fixed in the world lies in the camera frame at time 0, given where it lies in the camera frame at time
@@ -103,26 +103,38 @@ pub(crate) fn at_time_zero(point: &Vector3<f64>, velocity: &Velocity, seconds: f
 }
 
 impl Measured {
+    /// Returns the ray through the feature, with depth 1.
+    #[inline]
+    pub(crate) fn ray(&self, pinhole: &Pinhole) -> Vector3<f64> {
+        pinhole.unproject(f64::from(self.u), f64::from(self.v), 1.0).coords
+    }
+
     /// Returns the point of the camera frame at time 0. `depth_m` stands for a depth that was not measured.
     #[inline]
-    pub(crate) fn point(&self, velocity: &Velocity, pinhole: &Pinhole, depth_m: f64) -> Vector3<f64> {
-        let ray = pinhole.unproject(f64::from(self.u), f64::from(self.v), 1.0).coords;
+    pub(crate) fn point(
+        &self,
+        times: &FrameTimes,
+        velocity: &Velocity,
+        pinhole: &Pinhole,
+        depth_m: f64,
+    ) -> Vector3<f64> {
+        let (ray, seconds) = (self.ray(pinhole), times.color.seconds(f64::from(self.row)));
         let Some(measured) = self.depth_m.map(f64::from) else {
-            return at_time_zero(&(ray * depth_m), velocity, f64::from(self.seconds));
+            return at_time_zero(&(ray * depth_m), velocity, seconds);
         };
-        if self.depth_seconds == self.seconds {
-            return at_time_zero(&(ray * measured), velocity, f64::from(self.seconds));
+        let depth_seconds = times.depth_seconds(f64::from(self.depth_row));
+        if depth_seconds == seconds {
+            return at_time_zero(&(ray * measured), velocity, seconds);
         }
         // The depth at time 0 is that of the point when its depth was measured; then the ray is that of time 0.
-        let depth_m = at_time_zero(&(ray * measured), velocity, f64::from(self.depth_seconds)).z;
-        let moved = at_time_zero(&(ray * depth_m), velocity, f64::from(self.seconds));
+        let depth_m = at_time_zero(&(ray * measured), velocity, depth_seconds).z;
+        let moved = at_time_zero(&(ray * depth_m), velocity, seconds);
         moved * (depth_m / moved.z)
     }
 
     /// Looks up the depth where the depth image shows the point: the camera has moved between the two images.
     pub(crate) fn measure_depth(
         &mut self,
-        row: f64,
         times: &FrameTimes,
         velocity: &Velocity,
         camera: &Camera,
@@ -132,22 +144,19 @@ impl Measured {
             return;
         }
         let Some(first_guess) = self.depth_m else { return };
-        let pinhole = Pinhole::from(camera);
-        let point = self.point(velocity, &pinhole, f64::from(first_guess));
-        let mut seconds = times.depth_seconds(row);
-        let mut at = [0.0, row];
+        let point = self.point(times, velocity, &Pinhole::from(camera), f64::from(first_guess));
+        let mut at = [0.0, f64::from(self.row)];
         for _ in 0..2 {
-            let seen = at_time_zero(&point, &-velocity, seconds);
+            let seen = at_time_zero(&point, &-velocity, times.depth_seconds(at[1]));
             if seen.z <= 0.0 {
                 return;
             }
             at = camera.distort(seen.x / seen.z, seen.y / seen.z);
-            seconds = times.depth_seconds(at[1]);
         }
         let [x, y] = at.map(|v| v + 0.5);
         if x >= 0.0 && y >= 0.0 {
             self.depth_m = depth.metres(x as usize, y as usize);
-            self.depth_seconds = seconds as f32;
+            self.depth_row = at[1] as f32;
         }
     }
 }

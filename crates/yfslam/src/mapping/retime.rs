@@ -21,7 +21,7 @@ pub(crate) fn retime(context: &Context, map: &mut Map, keyframe: KeyFrameId, vel
         .collect();
     let typical_depth_m = map.median_depth(k);
     map.retime_features(keyframe, velocity, &sensor.pinhole, |i| depths[i].unwrap_or(typical_depth_m));
-    let Some(k) = map.keyframe(keyframe) else { return };
+    let Some(k) = map.keyframe(keyframe).filter(|k| !k.features.times().is_instant()) else { return };
     let mut observations = Vec::new();
     let mut own = Vec::new();
     for (i, id) in k.observed() {

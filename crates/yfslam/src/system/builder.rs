@@ -17,7 +17,7 @@ use crate::features::stereo_worker::{METRES_PER_UNIT, StereoWorker};
 use crate::features::{Features, OrbExtractor};
 use crate::image::{DepthImage, GrayImage, Image};
 use crate::map::Map;
-use crate::tracking::{Tracker, TrackingState, TwoViewInitialiser};
+use crate::tracking::{ReadoutEstimator, Tracker, TrackingState, TwoViewInitialiser};
 use crate::worker::Execution;
 
 /// What a map from an earlier session is used for.
@@ -140,6 +140,7 @@ impl SlamBuilder {
             extractor,
             gray: GrayImage::default(),
             frame_times: FrameTimes::new(&camera),
+            readout_estimator: Some(ReadoutEstimator::default()),
             stereo,
             sparse_depth: Arc::new(DepthImage {
                 raw: Image::new(camera.width, camera.height),

@@ -81,6 +81,20 @@ impl Slam {
     /// Takes over what the frame has shown about the velocity of the last one: its pose, and the features of a keyframe.
     fn correct_last_frame(&mut self) {
         let Some(velocity) = self.tracker.last_velocity else { return };
+        if let Some(estimator) = &mut self.readout_estimator {
+            self.tracker.estimate_readout(&self.context, self.owner.map(), estimator);
+            if self.statistics.frames % 50 == 0 {
+                if let Some(e) = estimator.estimate() {
+                    eprintln!(
+                        "READOUT {} {:.2} ms sigma {:.2} keyframes {}",
+                        self.statistics.frames,
+                        e.readout_s * 1e3,
+                        e.sigma_s * 1e3,
+                        e.keyframes
+                    );
+                }
+            }
+        }
         let (timestamp_ns, relative_pose) = self.tracker.last_pose();
         if let (Some(anchor), Some((reference, t_cam_reference))) = (self.anchors.last_mut(), relative_pose)
             && anchor.timestamp_ns == timestamp_ns

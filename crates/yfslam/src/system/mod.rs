@@ -29,7 +29,7 @@ use crate::geometry::Pose;
 use crate::image::{DepthImage, GrayImage};
 use crate::loops::LoopClosure;
 use crate::map::KeyFrameId;
-use crate::tracking::{Tracker, TrackingState, TwoViewInitialiser};
+use crate::tracking::{ReadoutEstimator, Tracker, TrackingState, TwoViewInitialiser};
 pub use builder::{MapUse, SlamBuilder};
 pub use errors::{FrameRejected, SetupError};
 use frame_detections::FrameDetections;
@@ -46,6 +46,8 @@ pub struct Slam {
     gray: GrayImage,
     /// When the rows of the images of a frame are read.
     frame_times: FrameTimes,
+    /// Estimates the readout time while it is not known.
+    readout_estimator: Option<ReadoutEstimator>,
     /// Matches right images, where depth comes from stereo.
     stereo: Option<StereoWorker>,
     /// The depth image of a camera that has none, or whose depth is not used: zero, but around features that have a depth from stereo.

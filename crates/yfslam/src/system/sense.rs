@@ -152,9 +152,9 @@ impl Slam {
             stereo.finish(&self.extractor, &self.extracted, &mut current.features, sparse);
         }
         let depth_after = measured.and(frame.depth_timestamp_ns).map_or(0, |ns| ns.saturating_sub(frame.timestamp_ns));
-        current.times = self.frame_times.with_depth_after(depth_after as f64 * 1e-9);
-        if !current.times.is_instant() {
-            current.features.keep_measured(&current.times);
+        let times = self.frame_times.with_depth_after(depth_after as f64 * 1e-9);
+        if !times.is_instant() || self.readout_estimator.is_some() {
+            current.features.keep_measured(times);
         }
         current.clear_matches();
     }

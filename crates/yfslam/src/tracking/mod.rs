@@ -6,6 +6,7 @@
 pub(crate) mod keyframe_policy;
 mod local_map;
 mod motion;
+mod readout_estimator;
 pub(crate) mod search;
 mod state;
 mod tracked_frame;
@@ -22,6 +23,7 @@ use crate::map::{KeyFrameId, KeyframeRelativePose, LandmarkId, Map};
 use keyframe_policy::{FrameSummary, is_keyframe_wanted};
 use local_map::LocalMap;
 use motion::Interval;
+pub(crate) use readout_estimator::{ReadoutEstimate, ReadoutEstimator};
 use search::{search_keyframe, search_last_frame, search_local_map};
 pub use state::{LostReason, TrackingState};
 pub(crate) use tracked_frame::{Match, TrackedFrame};
@@ -114,11 +116,11 @@ impl Tracker {
             self.current.refine_pose(context);
         }
         self.track_local_map(context, map, min_inliers)?;
-        if !self.current.times.is_instant() {
+        if !self.current.features.times().is_instant() {
             self.correct_shutter(context, self.current_velocity(context), None);
             self.inliers = self.current.refine_pose(context);
-            self.correct_last(context, map);
         }
+        self.correct_last(context, map);
         Ok(())
     }
 
@@ -137,19 +139,20 @@ impl Tracker {
 
     /// Brings the features of the current frame to the time of the middle row.
     fn correct_shutter(&mut self, context: &Context, velocity: Option<Velocity>, depth: Option<&DepthImage>) {
-        if let Some(velocity) = velocity.filter(|_| !self.current.times.is_instant()) {
+        if let Some(velocity) = velocity.filter(|_| self.current.features.keeps_measured()) {
             self.current.correct_shutter(&context.sensor, &velocity, depth);
         }
     }
 
     /// Corrects the last frame for its velocity, which is known better now, and refines its pose.
     fn correct_last(&mut self, context: &Context, map: &Map) {
-        let Some(next) = self.current_interval(context) else { return };
+        let Some(next) = self.current_interval(context).filter(|_| self.last.features.keeps_measured()) else { return };
         let velocity = self.interval.map_or(next.mean(), |interval| interval.at_joint(&next));
         self.last.drop_odometry_points();
         self.last.correct_shutter(&context.sensor, &velocity, None);
         self.last_velocity = Some(velocity);
-        if !self.last_was_keyframe() && self.last.match_count() > 0 {
+        let is_corrected = !self.last.features.times().is_instant();
+        if is_corrected && !self.last_was_keyframe() && self.last.match_count() > 0 {
             self.last.refine_pose(context);
             if let Some((reference, _)) = self.last.reference {
                 self.last.set_reference(reference, map);
@@ -275,6 +278,13 @@ impl Tracker {
         self.current.t_cam_world = self.last.t_cam_world;
         self.current.reference = self.last.reference;
         self.inliers = 0;
+    }
+
+    /// Lets the last frame, whose velocity is known now, tell about the readout time.
+    pub(crate) fn estimate_readout(&self, context: &Context, map: &Map, estimator: &mut ReadoutEstimator) {
+        if let (Some(reference), Some(_)) = (self.reference, self.last_velocity) {
+            estimator.add(context, map, reference, &self.last);
+        }
     }
 
     /// Returns time and relative pose of the last frame.

@@ -6,7 +6,7 @@ use nalgebra::{Matrix6, Point3};
 
 use crate::context::{Context, SensorModel};
 use crate::features::FrameFeatures;
-use crate::features::rolling_shutter::{FrameTimes, Velocity};
+use crate::features::rolling_shutter::Velocity;
 use crate::geometry::Pose;
 use crate::image::DepthImage;
 use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
@@ -38,8 +38,6 @@ impl Match {
 pub(crate) struct TrackedFrame {
     /// Time of the frame, ns.
     pub timestamp_ns: i64,
-    /// When the rows of its images are read.
-    pub times: FrameTimes,
     /// Features.
     pub features: FrameFeatures,
     /// Match of each feature.
@@ -104,7 +102,7 @@ impl TrackedFrame {
     /// matched points, or the median of these.
     pub(crate) fn correct_shutter(&mut self, sensor: &SensorModel, velocity: &Velocity, depth: Option<&DepthImage>) {
         if let Some(depth) = depth {
-            self.features.measure_depths(&self.times, velocity, &sensor.camera, depth);
+            self.features.measure_depths(velocity, &sensor.camera, depth);
         }
         let pose = &self.t_cam_world;
         let depth_of = |matched: &Match| (pose * matched.point_world).z;

@@ -1,0 +1,180 @@
+//! Estimates the readout time of a rolling shutter from the camera's own motion, without ground truth.
+//!
+//! In: tracked frames with their velocities, each with the keyframe that shares most landmarks with it. Out: the readout time with its
+//! standard deviation. For each pair of frame and keyframe the relative pose is refined together with the readout time, so that the error of
+//! reprojection becomes least; a wrong readout time leaves an error that grows with the row and with the velocity. The sums over all pairs
+//! give the estimate, the scatter over the keyframes its standard deviation.
+
+use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
+
+use crate::context::Context;
+use crate::geometry::{Pose, perturbed};
+use crate::map::{KeyFrameId, LandmarkId, Map};
+use crate::optimize::residual::{Measurement, huber, projection_jacobian};
+use crate::tracking::tracked_frame::TrackedFrame;
+
+/// Least number of points of a pair.
+const MIN_POINTS: usize = 40;
+/// Steps of the refinement of each pair.
+const STEPS: usize = 3;
+/// Least time between a frame and its keyframe, ns: before, the errors of both are nearly the same and cancel.
+const MIN_GAP_NS: i64 = 150_000_000;
+
+/// Sums over the pairs with one keyframe: `information · readout = evidence`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    information: f64,
+    evidence: f64,
+}
+
+/// A readout time with its standard deviation, and on how much it rests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ReadoutEstimate {
+    /// Time from the first to the last row, s.
+    pub readout_s: f64,
+    /// Standard deviation, s.
+    pub sigma_s: f64,
+    /// Number of keyframes with which frames were compared.
+    pub keyframes: usize,
+}
+
+/// Collects what pairs of frames say about the readout time.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ReadoutEstimator {
+    /// For each keyframe in the order of time.
+    keyframes: Vec<(KeyFrameId, Sums)>,
+    points: Vec<PairPoint>,
+}
+
+/// A landmark that a frame and a keyframe observe.
+#[derive(Clone, Copy, Debug)]
+struct PairPoint {
+    /// Position in the keyframe's camera frame at the time of its row, m.
+    point: Vector3<f64>,
+    /// Its velocity there, m for each unit of row time: the row as a share of the image, −½ to ½, times the motion of the point.
+    row_motion: Vector3<f64>,
+    /// Row in the frame, as a share of the image, −½ to ½.
+    row: f64,
+    /// Position in the frame, px.
+    measurement: Measurement,
+}
+
+impl ReadoutEstimator {
+    /// Adds a tracked frame whose velocity is known from its neighbours.
+    pub(crate) fn add(&mut self, context: &Context, map: &Map, reference: KeyFrameId, frame: &TrackedFrame) {
+        let TrackedFrame { timestamp_ns, features, matches, t_cam_world, .. } = frame;
+        let Some(keyframe) = map.keyframe(reference) else { return };
+        let (Some(of_frame), Some(of_keyframe)) = (features.velocity(), keyframe.features.velocity()) else { return };
+        if timestamp_ns.abs_diff(keyframe.timestamp_ns) < MIN_GAP_NS.unsigned_abs() {
+            return;
+        }
+        let sensor = &context.sensor;
+        let share = |row: f32| f64::from(row) / (sensor.camera.height.max(2) - 1) as f64 - 0.5;
+        self.points.clear();
+        for (i, matched) in matches.iter().enumerate() {
+            let Some(id) = matched.and_then(|m| m.landmark) else { continue };
+            let Some(j) = map.landmark(id).and_then(|l| l.feature_in(reference)) else { continue };
+            let (Some(seen), Some(known)) = (features.measured(i), keyframe.features.measured(j)) else { continue };
+            let depth_m = known.depth_m.map(f64::from).or_else(|| depth_in(map, id, &keyframe.t_cam_world));
+            let Some(depth_m) = depth_m else { continue };
+            let point = known.ray(&sensor.pinhole) * depth_m;
+            let feature = &features.features[i];
+            let measurement = Measurement {
+                u: f64::from(seen.u),
+                v: f64::from(seen.v),
+                weight_disparity: 0.0,
+                ..sensor.measurement(feature)
+            };
+            let row_motion = motion_of(&point, of_keyframe) * share(known.row);
+            self.points.push(PairPoint { point, row_motion, row: share(seen.row), measurement });
+        }
+        if self.points.len() < MIN_POINTS {
+            return;
+        }
+        let before = self.estimate().map_or(0.0, |estimate| estimate.readout_s);
+        let t_frame_keyframe = t_cam_world * keyframe.t_cam_world.inverse();
+        let Some(sums) = refine(context, &self.points, t_frame_keyframe, of_frame, before) else { return };
+        match self.keyframes.last_mut().filter(|(id, _)| *id == reference) {
+            Some((_, total)) => {
+                total.information += sums.information;
+                total.evidence += sums.evidence;
+            }
+            None => self.keyframes.push((reference, sums)),
+        }
+    }
+
+    /// Returns the estimate so far; `None` with fewer than three keyframes or without any motion.
+    pub(crate) fn estimate(&self) -> Option<ReadoutEstimate> {
+        let information: f64 = self.keyframes.iter().map(|(_, s)| s.information).sum();
+        let evidence: f64 = self.keyframes.iter().map(|(_, s)| s.evidence).sum();
+        let keyframes = self.keyframes.len();
+        if keyframes < 3 || information <= 0.0 {
+            return None;
+        }
+        let readout_s = evidence / information;
+        // Errors of one keyframe are common to all its pairs, so the scatter over keyframes counts, not that over pairs.
+        let scatter: f64 = self.keyframes.iter().map(|(_, s)| (s.evidence - s.information * readout_s).powi(2)).sum();
+        let sigma_s = (scatter * keyframes as f64 / (keyframes - 1) as f64).sqrt() / information;
+        Some(ReadoutEstimate { readout_s, sigma_s, keyframes })
+    }
+}
+
+/// Velocity of a point that is fixed in the world in the frame of a camera that moves, with the sign of
+/// [`at_time_zero`](crate::features::rolling_shutter::at_time_zero): towards the place that it has at time 0.
+fn motion_of(point: &Vector3<f64>, velocity: &Vector6<f64>) -> Vector3<f64> {
+    velocity.fixed_rows::<3>(0) + velocity.fixed_rows::<3>(3).cross(point)
+}
+
+fn depth_in(map: &Map, id: LandmarkId, t_cam_world: &Pose) -> Option<f64> {
+    map.landmark(id).map(|l| (t_cam_world * l.position).z).filter(|z| *z > 0.0)
+}
+
+/// Refines the relative pose of a pair and the readout time together. Returns what the pair says about the readout time.
+fn refine(
+    context: &Context,
+    points: &[PairPoint],
+    mut t_frame_keyframe: Pose,
+    velocity: &Vector6<f64>,
+    mut readout_s: f64,
+) -> Option<Sums> {
+    let pinhole = &context.sensor.pinhole;
+    let mut sums = None;
+    for _ in 0..STEPS {
+        let mut h = SMatrix::<f64, 7, 7>::zeros();
+        let mut b = SVector::<f64, 7>::zeros();
+        let rotation = t_frame_keyframe.rotation.to_rotation_matrix();
+        for p in points {
+            let at_zero = t_frame_keyframe * nalgebra::Point3::from(p.point + p.row_motion * readout_s);
+            let in_frame = motion_of(&at_zero.coords, velocity) * -p.row;
+            let seen = at_zero.coords + in_frame * readout_s;
+            if seen.z <= 1e-3 {
+                continue;
+            }
+            let residual = p.measurement.residual(pinhole, &seen);
+            let (_, weight) = huber(p.measurement.chi2(&residual), p.measurement.chi2_limit());
+            let weight = weight * p.measurement.weight_px;
+            let jacobian = projection_jacobian(pinhole, &seen);
+            let by_readout = rotation * p.row_motion + in_frame;
+            for k in 0..2 {
+                let a = Vector3::new(jacobian[(k, 0)], jacobian[(k, 1)], jacobian[(k, 2)]);
+                let c = at_zero.coords.cross(&a);
+                let row = SVector::<f64, 7>::from([a.x, a.y, a.z, c.x, c.y, c.z, a.dot(&by_readout)]);
+                h += row * row.transpose() * weight;
+                b += row * (residual[k] * weight);
+            }
+        }
+        let poses: Matrix6<f64> = h.fixed_view::<6, 6>(0, 0).into_owned();
+        let cross: Vector6<f64> = h.fixed_view::<6, 1>(0, 6).into_owned();
+        let solved = poses.cholesky()?;
+        let information = h[(6, 6)] - cross.dot(&solved.solve(&cross));
+        let gradient: Vector6<f64> = b.fixed_rows::<6>(0).into_owned();
+        let reduced = b[6] - cross.dot(&solved.solve(&gradient));
+        sums = Some(Sums { information, evidence: reduced + information * readout_s });
+        // A pair alone may say little about the readout time; then it is left as it is.
+        let step = 0.0;
+        readout_s += step;
+        let pose_step = solved.solve(&(gradient - cross * step));
+        t_frame_keyframe = perturbed(&pose_step, &t_frame_keyframe);
+    }
+    sums
+}
