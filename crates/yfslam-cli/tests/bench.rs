@@ -109,7 +109,7 @@ fn a_folder_of_sequences_is_run_and_published_results_are_added_to_benchmark_seq
 }
 
 #[test]
-fn recordings_of_the_same_name_are_told_apart_by_their_parents() {
+fn recordings_of_the_same_name_are_distinguished_by_their_parents() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
     for name in ["a/rgbd_bonn_crowd", "b/rgbd_bonn_crowd"] {

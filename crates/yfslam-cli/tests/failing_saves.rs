@@ -1,4 +1,4 @@
-//! Outputs that cannot be written, and standard streams that nobody reads: everything else is written all the same.
+//! Outputs that cannot be written, and standard streams that are not read: everything else is written all the same.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
@@ -65,7 +65,7 @@ fn images_that_can_no_longer_be_written_do_not_end_the_run() {
     fs::create_dir_all(&overlay).unwrap();
     // The fourth image has the name of a folder.
     fs::create_dir(overlay.join("000003.png")).unwrap();
-    // An earlier image that cannot be removed is known before the run.
+    // An earlier image that cannot be removed is found before the run.
     fails(folder.path(), &run(&["--overlay"]), &["cannot remove the old", "000003.png", "choose another folder"]);
     fs::remove_dir(overlay.join("000003.png")).unwrap();
     let mut child = program(folder.path(), &run(&["--overlay"])).spawn().unwrap();
@@ -145,7 +145,7 @@ fn a_full_or_closed_standard_error_does_not_end_a_run() {
 }
 
 #[test]
-fn a_standard_error_that_nobody_reads_does_not_hold_up_a_run() {
+fn a_standard_error_that_is_not_read_does_not_hold_up_a_run() {
     let folder = recording();
     let (_reader, writer) = std::io::pipe().unwrap();
     // More than a pipe holds is in it already.

@@ -130,15 +130,15 @@ fn a_killed_run_leaves_its_last_checkpoint_and_the_next_run_removes_incomplete_f
 
 #[test]
 fn a_second_signal_ends_the_program_at_once() {
-    // The renderer needs long for its first frame, so that the first signal cannot end the run.
+    // A frame takes long, so that the run cannot end in order between the two signals.
     let folder = tempfile::tempdir().unwrap();
     let slow = "synth:walking_xyz?people=0&frames=2&width=4096&height=4096";
     let mut running = Running::start(folder.path(), &["run", slow, "--method", "none", "--out", "out"]);
     running.wait_until("the beginning of the run", || folder.path().join("out/config.toml").is_file());
+    // Two different ones: the same signal twice may arrive once.
     running.send(Signal::INT);
-    std::thread::sleep(Duration::from_millis(20));
-    running.send(Signal::INT);
-    assert_eq!(running.end(), Some(130));
+    running.send(Signal::TERM);
+    assert!(matches!(running.end(), Some(130 | 143)));
     let stderr = fs::read_to_string(folder.path().join("stderr")).unwrap();
     assert!(!stderr.contains("interrupted"), "the program ended in order: {stderr}");
 }

@@ -8,8 +8,8 @@ use clap::Args;
 use yfslam::{Detection, Detector, RgbImage, RollCompensation};
 use yfslam_detect::DetectorConfig;
 use yfslam_io::decode::decode_color;
-use yfslam_io::read_file;
 use yfslam_io::write::write_color_png;
+use yfslam_io::{prepare_folder, read_file};
 
 use crate::input::detector::{self, DetectorArgs, LoadedDetector};
 use crate::input::instance_detector::InstanceDetector;
@@ -120,7 +120,7 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
         if found.is_unreadable() {
             terminal.warn(&found.to_string());
         } else if files.len() <= MAX_PRINTED {
-            // Detection goes on for `boxes.json` although nobody reads the results.
+            // Detection goes on for `boxes.json` although the results cannot be printed any more.
             printed = printed.and_then(|()| terminal.result(&format!("{found}\n")));
         }
         list.images.push(found);
@@ -183,6 +183,7 @@ fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
 /// Returns the folder for images; removes the images of an earlier run.
 fn image_folder(out: &OutputFolder) -> Result<PathBuf> {
     let folder = out.path().join("images");
+    prepare_folder(&folder).with_context(|| format!("--images: the folder {} cannot be used", folder.display()))?;
     let is_ours = |name: &str| name.ends_with(".png") && name.bytes().take_while(u8::is_ascii_digit).count() >= 6;
     remove_files(&folder, is_ours)?;
     Ok(folder)

@@ -16,7 +16,7 @@ use signal_hook::flag;
 /// The exit code of a program that a signal has ended is this number plus that of the signal, by the convention of shells.
 const EXIT_CODE_BASE: i32 = 128;
 
-/// Knows whether a signal has asked the program to end.
+/// The signal that has asked the program to end, once there is one.
 #[derive(Clone, Debug)]
 pub struct Interrupt(Arc<AtomicUsize>);
 

@@ -1,6 +1,6 @@
 //! Messages on standard error, which can neither end nor hold up the program: a thread writes them.
 //!
-//! In: lines. Out: the same lines, in the same order, on standard error. It may be closed, on a full disk, or a pipe that nobody reads;
+//! In: lines. Out: the same lines, in the same order, on standard error. It may be closed, on a full disk, or a pipe that is not read;
 //! then lines are left out, and the results of the program do not depend on it.
 
 use std::collections::VecDeque;
@@ -28,7 +28,7 @@ struct State {
     written: usize,
     /// Lines left out since the last one that was written.
     left_out: usize,
-    /// Nobody waits for a stuck reader any more, until it continues.
+    /// Standard error is not read: no thread waits for it until it is.
     is_stuck: bool,
 }
 
@@ -132,7 +132,7 @@ impl Messages {
             match std::mem::take(&mut state.left_out) {
                 0 => {}
                 count => {
-                    let note = format!("note: {count} messages were left out, because nothing read standard error\n");
+                    let note = format!("note: {count} messages were left out, because standard error was not read\n");
                     state.waiting.push_back(note.into_bytes());
                 }
             }

@@ -1,6 +1,6 @@
 //! Temporary files and folders, which are locked while their process runs.
 //!
-//! The lock tells an abandoned file from one in use, also if the processes run in different containers, where process numbers say nothing.
+//! The lock distinguishes an abandoned file from one in use, also between containers, in which process numbers mean nothing.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;

@@ -13,7 +13,7 @@ use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
 use clap::{Args, value_parser};
-use yfslam_io::write_atomically;
+use yfslam_io::{prepare_folder, write_atomically};
 use yfslam_report::{TableSection, TableStyle, TablesPage};
 
 use self::cell::{Cell, Group};
@@ -98,6 +98,7 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
     }
     let groups = args.groups(datasets.as_ref().map(|datasets| datasets.folders.as_slice()))?;
     let out = OutputFolder::prepare(args.out.as_deref(), "bench")?;
+    ["cells", "tables"].iter().try_for_each(|part| prepare_folder(&out.path().join(part)))?;
     let program = std::env::current_exe().context("cannot find the file of this program")?;
     let binary = std::fs::read(&program).with_context(|| format!("cannot read {}", program.display()))?;
     let bench = Bench {
@@ -113,10 +114,11 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
         if let Ok(mut progress) = progress.lock() {
             progress.at(done, "cells", String::new);
         }
-    })?;
+    });
     if let Ok(progress) = progress.into_inner() {
         progress.finish();
     }
+    let cells = cells?;
     for cell in cells.iter().filter(|cell| cell.failure.is_some()) {
         let failure = cell.failure.as_deref().unwrap_or_default();
         terminal.warn(&format!("{} with {}, seed {}: {failure}", cell.sequence, cell.method, cell.seed));

@@ -1,4 +1,4 @@
-//! Names of recordings in tables and files: the name of the folder, with as many of its parents as tell it from the others.
+//! Names of recordings in tables and files: the name of the folder, with as many of its parents as distinguish it from the others.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path};

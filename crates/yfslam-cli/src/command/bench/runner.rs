@@ -173,7 +173,7 @@ impl Bench {
     }
 }
 
-/// Returns the signal that somebody sent to the process and not to the bench.
+/// Returns the signal that ended the process, if it was sent to the process and not to the bench.
 fn signal_of(status: ExitStatus) -> Option<Interrupted> {
     status.code().and_then(Interrupted::of_exit_code)
 }

@@ -1,11 +1,11 @@
-//! `--checkpoint`: what is known so far is saved at intervals, so that a killed run loses no more than one interval.
+//! `--checkpoint`: the results so far are saved at intervals, so that a killed run loses no more than one interval.
 
 use std::time::{Duration, Instant};
 
 /// Longest interval, s: about a month. A longer one would be a mistake.
 const MAX_S: f64 = 3e6;
 
-/// Says when the next checkpoint is due.
+/// The times of the checkpoints.
 pub struct Checkpoints {
     /// `None` without checkpoints.
     every: Option<Duration>,

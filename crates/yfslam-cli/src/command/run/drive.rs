@@ -95,7 +95,7 @@ impl RecordedRun {
         }
     }
 
-    /// Saves what is known so far. What cannot be saved now may be at the next time, or at the end.
+    /// Saves the results so far. A file that cannot be written now is written at the next checkpoint or at the end.
     fn save_checkpoint(&mut self, map: &MapArgs, terminal: Terminal) {
         let started = Instant::now();
         if let Err(error) = self.recorder.write_checkpoint(&mut self.run.pipeline, map) {

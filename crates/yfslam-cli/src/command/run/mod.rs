@@ -217,7 +217,7 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     if let Some(page) = page {
         text += &format!("report: {}\n", page.display());
     }
-    // Only now: all files are written, and nobody may read the summary.
+    // Standard output may be closed, so all files are written before.
     let printed = terminal.result(&text);
     failures.check()?;
     interrupt.check()?;
