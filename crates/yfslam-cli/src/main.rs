@@ -18,16 +18,19 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use ui::terminal;
+use ui::interrupt::Interrupted;
+use ui::{messages, terminal};
 
 fn main() -> ExitCode {
     let cli = command::cli::Cli::parse();
-    match command::run(&cli) {
+    let code = match command::run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if terminal::is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            terminal::error(&error);
-            ExitCode::FAILURE
+            terminal::print_error(&error);
+            error.downcast_ref::<Interrupted>().map_or(ExitCode::FAILURE, |interrupted| interrupted.exit_code())
         }
-    }
+    };
+    messages::flush();
+    code
 }

@@ -107,3 +107,27 @@ fn a_folder_of_sequences_is_run_and_published_results_are_added_to_benchmark_seq
     fails(root, &["bench", "--known", "data/other"], &["none of the benchmark", "walking_xyz"]);
     fails(root, &["bench", "data/other/rgb"], &["lists of images"]);
 }
+
+#[test]
+fn recordings_of_the_same_name_are_distinguished_by_their_parents() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    for name in ["a/rgbd_bonn_crowd", "b/rgbd_bonn_crowd"] {
+        record(&root.join(name));
+    }
+    let args = ["bench", "a/rgbd_bonn_crowd", "b/rgbd_bonn_crowd", "b/../a/rgbd_bonn_crowd"];
+    let output =
+        succeeds(root, &[&args[..], &["--methods", "none", "--seeds", "1", "--jobs", "2", "--out", "o"]].concat());
+    let cells: Vec<_> = fs::read_dir(root.join("o/cells")).unwrap().collect();
+    assert_eq!(cells.len(), 2);
+    let rows = fs::read_to_string(root.join("o/tables/ate.csv")).unwrap();
+    for row in ["\na/rgbd_bonn_crowd,none,", "\nb/rgbd_bonn_crowd,none,", "published: "] {
+        assert!(rows.contains(row), "{rows}");
+    }
+    assert!(!output.stdout.contains("2 runs"), "{}", output.stdout);
+    // Names that differ only in characters that files cannot have.
+    for name in ["c/x y", "c/x_y"] {
+        record(&root.join(name));
+    }
+    fails(root, &["bench", "c/x y", "c/x_y", "--methods", "none"], &["c/x y", "c/x_y", "rename one of the folders"]);
+}

@@ -138,25 +138,37 @@ fn methods_are_compared_on_a_recording_as_on_a_world() {
 #[test]
 fn a_method_that_fails_writes_the_reason_to_its_folder_and_does_not_stop_the_others() {
     let folder = tempfile::tempdir().unwrap();
-    record(&folder.path().join("seq"));
-    // A file in place of the folder for images.
-    fs::create_dir_all(folder.path().join("out/none")).unwrap();
-    fs::write(folder.path().join("out/none/overlay"), "").unwrap();
-    // A list without boxes: the method runs, and needs no network.
-    fs::write(folder.path().join("seq/boxes.json"), r#"{"classes":["person"],"frames":[]}"#).unwrap();
-    let args = ["run", "seq", "--overlay", "--out", "out"];
-    let output = succeeds(folder.path(), &[&args[..], &["--method", "none,yf"]].concat());
-    assert!(output.stderr.contains("warning: none: ") && output.stderr.contains("overlay"), "{}", output.stderr);
-    assert_eq!(report(&folder.path().join("out/yf"))["frames"]["tracked"], 12);
-    assert!(!folder.path().join("out/none/run.json").exists());
-    let failure = folder.path().join("out/none/failure.txt");
-    assert!(fs::read_to_string(&failure).unwrap().contains("overlay"));
-    fs::remove_file(folder.path().join("out/none/overlay")).unwrap();
-    succeeds(folder.path(), &[&args[..], &["--method", "none,yf"]].concat());
+    let seq = folder.path().join("seq");
+    record(&seq);
+    // One person fills every image: the method `boxes` has no feature, and `none` does not use the boxes.
+    let stamps = fs::read_to_string(seq.join("rgb.txt")).unwrap();
+    let frame = |line: &str| {
+        let stamp = line.split_once(' ').unwrap().0.replace('.', "");
+        let bbox = r#"[{"instance":1,"class":"person","bbox":[0,0,320,240]}]"#;
+        format!(r#"{{"timestamp_ns":{},"boxes":{bbox}}}"#, stamp.parse::<i64>().unwrap())
+    };
+    let frames: Vec<_> = stamps.lines().map(frame).collect();
+    let everywhere = format!(r#"{{"classes":["person"],"frames":[{}]}}"#, frames.join(","));
+    fs::write(seq.join("boxes.json"), everywhere).unwrap();
+    fs::write(folder.path().join("strict.toml"), "[dynamic]\nmin_trusted = 0\n").unwrap();
+    let args = ["run", "seq", "--overlay", "--out", "out", "--method", "none,boxes", "--config", "strict.toml"];
+    let output = succeeds(folder.path(), &args);
+    assert!(output.stderr.contains("warning: boxes: no trajectory"), "{}", output.stderr);
+    assert_eq!(report(&folder.path().join("out/none"))["frames"]["tracked"], 12);
+    assert!(!folder.path().join("out/boxes/run.json").exists());
+    let failure = folder.path().join("out/boxes/failure.txt");
+    assert!(fs::read_to_string(&failure).unwrap().contains("no trajectory"));
+    fs::write(seq.join("boxes.json"), r#"{"classes":["person"],"frames":[]}"#).unwrap();
+    succeeds(folder.path(), &args);
     assert!(!failure.exists());
+    // A file in place of a folder is found before the run.
+    fs::remove_dir_all(folder.path().join("out/none/overlay")).unwrap();
+    fs::write(folder.path().join("out/none/overlay"), "").unwrap();
+    fails(folder.path(), &args, &["out/none/overlay cannot be used", "a part of this path is a file"]);
+    fs::remove_file(folder.path().join("out/none/overlay")).unwrap();
     // Faulty frames fail every method.
-    let black = [&args[..], &["--method", "none,yf", "--fault", "black@0+9"]].concat();
-    fails(folder.path(), &black, &["none: no trajectory", "yf: no trajectory", "no method has a trajectory"]);
+    let black = [&args[..], &["--fault", "black@0+9"]].concat();
+    fails(folder.path(), &black, &["none: no trajectory", "boxes: no trajectory", "no method has a trajectory"]);
 }
 
 #[test]

@@ -134,3 +134,16 @@ fn the_list_has_every_name_and_each_world_can_be_rendered() {
     }
     fails(folder.path(), &["synth"], &["--out", "WORLD"]);
 }
+
+#[test]
+fn a_number_that_no_world_can_have_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = "synth:walking_xyz?robots=18446744073709551615&people=4&frames=3&width=64&height=48";
+    for command in ["run", "info"] {
+        fails(
+            folder.path(),
+            &[command, world],
+            &["robots", "18446744073709551615", "at most 6 together with the people"],
+        );
+    }
+}

@@ -45,7 +45,7 @@ mod timestamp_order;
 pub mod trajectory;
 pub mod write;
 
-pub use atomic_file::write_atomically;
+pub use atomic_file::{prepare_folder, write_atomically};
 pub use boxes::BoxList;
 pub use camera::{CameraSource, detect_camera, load_camera};
 pub use depth::{DepthStatistics, check_recording};
@@ -53,6 +53,7 @@ pub use error::{Error, Result};
 pub use faults::{Delivery, Fault, FaultInjector, FaultKind};
 pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};
+pub use text::read_file;
 pub use trajectory::{StampedPose, TrajectoryFile, write_trajectory};
 pub use write::RecordingWriter;
 

@@ -9,12 +9,15 @@ use yfslam::{Detection, Detector, RgbImage, RollCompensation};
 use yfslam_detect::DetectorConfig;
 use yfslam_io::decode::decode_color;
 use yfslam_io::write::write_color_png;
+use yfslam_io::{prepare_folder, read_file};
 
 use crate::input::detector::{self, DetectorArgs, LoadedDetector};
 use crate::input::instance_detector::InstanceDetector;
 use crate::output::detections_file::{DetectionsFile, ImageDetections, ImageResult, ObjectBox};
 use crate::output::folder::{OutputFolder, remove_files};
 use crate::stats::stages::StageSummary;
+use crate::ui::failures::Failures;
+use crate::ui::interrupt::Interrupt;
 use crate::ui::progress::Progress;
 use crate::ui::terminal::{Terminal, explain};
 
@@ -69,6 +72,7 @@ pub struct DetectArgs {
 }
 
 pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
+    let interrupt = Interrupt::watch()?;
     let files = args.files()?;
     let config = DetectorConfig { score_threshold: args.score, iou_threshold: args.iou, ..Default::default() };
     let LoadedDetector { detector, times, identity } = detector::load(&args.detector, config)?;
@@ -89,7 +93,12 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
     };
     let mut progress = Progress::new(terminal, "detect", files.len());
     let mut upright = RollCompensation::default();
+    let mut failures = Failures::new(terminal);
+    let mut printed = Ok(());
     for (index, file) in files.iter().enumerate() {
+        if interrupt.received().is_some() {
+            break;
+        }
         let result = match detect(file, &mut detector, &mut upright, args.roll) {
             Ok((image, detections)) => {
                 let mask = upright.mask(&detector);
@@ -100,7 +109,8 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
                 let boxes: Vec<ObjectBox> = detections.into_iter().filter_map(of).collect();
                 if let Some(folder) = &images {
                     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-                    write_color_png(&folder.join(format!("{index:06}-{stem}.png")), &list.draw(&image, &boxes))?;
+                    let path = folder.join(format!("{index:06}-{stem}.png"));
+                    failures.keep(write_color_png(&path, &list.draw(&image, &boxes)));
                 }
                 ImageResult::Detected { width: image.width(), height: image.height(), boxes }
             }
@@ -110,27 +120,27 @@ pub fn run(args: &DetectArgs, terminal: Terminal) -> Result<()> {
         if found.is_unreadable() {
             terminal.warn(&found.to_string());
         } else if files.len() <= MAX_PRINTED {
-            terminal.result(&format!("{found}\n"))?;
+            // Detection goes on for `boxes.json` although the results cannot be printed any more.
+            printed = printed.and_then(|()| terminal.result(&format!("{found}\n")));
         }
         list.images.push(found);
         progress.at(index + 1, "images", String::new);
     }
     progress.finish();
-    list.write(&out.path().join("boxes.json"))?;
+    failures.keep(list.write(&out.path().join("boxes.json")));
     let took: Vec<Duration> = times.try_iter().map(|took| took.wall).collect();
     let median = StageSummary::of(&took).map_or(String::new(), |s| format!("; {:.2} ms an image", s.median_ms));
-    terminal.result(&format!(
-        "{}, with the {identity}{median}\nwritten to {}\n",
-        list.summary(),
-        out.path().display()
-    ))?;
+    let summary = format!("{}, with the {identity}{median}\nwritten to {}\n", list.summary(), out.path().display());
+    printed = printed.and_then(|()| terminal.result(&summary));
+    failures.check()?;
+    interrupt.check()?;
     let unreadable = list.images.iter().filter(|image| image.is_unreadable()).count();
     ensure!(
         unreadable == 0,
         "{unreadable} of {} images could not be read; see the warnings, or `error` in boxes.json",
         files.len()
     );
-    Ok(())
+    printed
 }
 
 impl DetectArgs {
@@ -173,6 +183,7 @@ fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
 /// Returns the folder for images; removes the images of an earlier run.
 fn image_folder(out: &OutputFolder) -> Result<PathBuf> {
     let folder = out.path().join("images");
+    prepare_folder(&folder).with_context(|| format!("--images: the folder {} cannot be used", folder.display()))?;
     let is_ours = |name: &str| name.ends_with(".png") && name.bytes().take_while(u8::is_ascii_digit).count() >= 6;
     remove_files(&folder, is_ours)?;
     Ok(folder)
@@ -185,7 +196,7 @@ fn detect(
     upright: &mut RollCompensation,
     roll_deg: i32,
 ) -> Result<(RgbImage, Vec<Detection>)> {
-    let bytes = std::fs::read(file).with_context(|| format!("{} cannot be read", file.display()))?;
+    let bytes = read_file(file).with_context(|| format!("{} cannot be read", file.display()))?;
     let (mut image, mut found) = (RgbImage::default(), Vec::new());
     decode_color(&bytes, None, &mut image).map_err(|error| anyhow!("{} {error}", file.display()))?;
     upright.detect(detector, &image, roll_deg, &mut found).with_context(|| file.display().to_string())?;

@@ -11,6 +11,7 @@ use yfslam_io::{BoxList, Delivery, Fault, FaultInjector, RecordingWriter, Stampe
 use yfslam_synth::{CLASS_NAMES, SUITE, SynthFrame, World};
 
 use crate::input::source::SourceArgs;
+use crate::ui::interrupt::Interrupt;
 use crate::ui::progress::Progress;
 use crate::ui::terminal::{Terminal, print};
 
@@ -32,7 +33,9 @@ Files in the folder:
   camera.toml                                      camera
   boxes.json                                       class, instance and exact bounding box of movable objects, for `yfslam run`
   masks/                                           mask of each frame with instances, 0 for static pixels, for `yfslam run --masks`
-  world.toml                                       all settings of the world";
+  world.toml                                       all settings of the world
+
+  The folder appears once it is complete. SIGINT (Ctrl-C) and SIGTERM end the command without it, with exit code 130 or 143.";
 
 /// Write a synthetic world to a folder: images, exact poses, boxes and masks.
 #[derive(Args, Debug)]
@@ -64,6 +67,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
         (Some(world), Some(out)) => (world, out),
         _ => bail!("give a world and a folder, as in `yfslam synth walking_xyz --out walk`; --list prints the worlds"),
     };
+    let interrupt = Interrupt::watch()?;
     let mut source = SourceArgs::new(world.clone());
     source.camera.clone_from(&args.camera);
     let config = source.world()?;
@@ -76,6 +80,8 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
     let (mut number, mut offset_ns) = (0, 0);
     let batch = BATCH_PER_THREAD * rayon::current_num_threads();
     for start in (0..world.len()).step_by(batch) {
+        // The unfinished folder is removed.
+        interrupt.check()?;
         let end = (start + batch).min(world.len());
         let rendered: Vec<SynthFrame> = (start..end).into_par_iter().map(|index| world.frame(index)).collect();
         rendered.par_iter().try_for_each(|one| writer.write_mask(one.frame.timestamp_ns, &one.instances))?;

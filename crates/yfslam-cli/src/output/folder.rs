@@ -1,52 +1,80 @@
 //! The output folder of a command; every file is written whole or not at all.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use yfslam::Config;
 use yfslam_io::write::write_ply;
-use yfslam_io::{write_atomically, write_trajectory};
+use yfslam_io::{StampedPose, prepare_folder, write_atomically, write_trajectory};
 
+use super::dense::DENSE_FILE;
+use super::overlay;
 use super::report::RunReport;
 use crate::run::pipeline::Outcome;
+use crate::ui::failures::Failures;
 
 /// Parent of the output folders of runs without `--out`.
 const DEFAULT_PARENT: &str = "yfslam-out";
 /// File with the reason why one method of several has no result.
 pub const FAILURE_FILE: &str = "failure.txt";
+/// Page with the results.
+pub const REPORT_FILE: &str = "report.html";
+
+const TRAJECTORY_FILE: &str = "trajectory.txt";
+const KEYFRAMES_FILE: &str = "keyframes.txt";
+const LIVE_FILE: &str = "live.txt";
+const LANDMARKS_FILE: &str = "map.ply";
+const RUN_FILE: &str = "run.json";
+const CONFIG_FILE: &str = "config.toml";
+
+/// The results of a run; `config.toml` is no result, and may be the input that repeats the run.
+const RESULT_FILES: [&str; 8] =
+    [TRAJECTORY_FILE, KEYFRAMES_FILE, LIVE_FILE, LANDMARKS_FILE, RUN_FILE, REPORT_FILE, DENSE_FILE, FAILURE_FILE];
 
 /// A folder that can be written to.
 #[derive(Clone, Debug)]
 pub struct OutputFolder(PathBuf);
 
 impl OutputFolder {
-    /// Creates the folder `out`, or else one named after the sequence, and checks that files can be written there.
+    /// Creates the folder `out`, or else one named after the sequence, and checks that files can be written there. Incomplete files of
+    /// killed runs are removed.
     ///
     /// # Errors
     /// The folder cannot be written to.
     pub fn prepare(out: Option<&Path>, name: &str) -> Result<Self> {
         let folder = out.map_or_else(|| Path::new(DEFAULT_PARENT).join(name), PathBuf::from);
-        let probe = folder.join(".yfslam-probe");
-        write_atomically(&probe, |_| Ok(()))
-            .with_context(|| format!("the output folder {} cannot be used", folder.display()))?;
-        // A probe that stays does no harm.
-        let _ = std::fs::remove_file(&probe);
+        prepare_folder(&folder).with_context(|| format!("the output folder {} cannot be used", folder.display()))?;
         Ok(Self(folder))
     }
 
-    /// Creates a folder in it for one method of several, and removes the failure of an earlier run.
+    /// Creates a folder in it for one method of several.
     ///
     /// # Errors
     /// As [`OutputFolder::prepare`].
     pub fn for_method(&self, name: &str) -> Result<Self> {
-        let folder = Self::prepare(Some(&self.0.join(name)), name)?;
-        // The file may not exist; if it cannot be removed, a new failure overwrites it.
-        let _ = std::fs::remove_file(folder.0.join(FAILURE_FILE));
-        Ok(folder)
+        Self::prepare(Some(&self.0.join(name)), name)
     }
 
     pub fn path(&self) -> &Path {
         &self.0
+    }
+
+    /// Returns whether `path` is a file of a run in this folder.
+    pub fn has_result(&self, path: &Path) -> bool {
+        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let is_here = matches!((parent.canonicalize(), self.0.canonicalize()), (Ok(a), Ok(b)) if a == b);
+        let names = RESULT_FILES.iter().chain([&CONFIG_FILE]);
+        is_here && names.map(OsStr::new).any(|name| path.file_name() == Some(name))
+    }
+
+    /// Removes the results of an earlier run, which must not be taken for those of this one.
+    ///
+    /// # Errors
+    /// A file cannot be removed.
+    pub fn remove_results(&self) -> Result<()> {
+        remove_files(&self.0, |name| RESULT_FILES.contains(&name))?;
+        overlay::remove(&self.0)
     }
 
     /// Writes why the method has no result.
@@ -57,17 +85,31 @@ impl OutputFolder {
         Ok(write_atomically(&self.0.join(FAILURE_FILE), |file| writeln!(file, "{reason}"))?)
     }
 
-    /// Writes trajectories, landmarks and configuration.
+    /// Writes the configuration.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_config(&self, config: &Config) -> Result<()> {
+        let toml = config.to_commented_toml()?;
+        Ok(write_atomically(&self.0.join(CONFIG_FILE), |file| file.write_all(toml.as_bytes()))?)
+    }
+
+    /// Writes trajectories as they are now.
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn write(&self, outcome: &Outcome, config: &Config) -> Result<()> {
-        write_trajectory(&self.0.join("trajectory.txt"), &outcome.trajectory)?;
-        write_trajectory(&self.0.join("keyframes.txt"), &outcome.keyframes)?;
-        write_trajectory(&self.0.join("live.txt"), &outcome.live)?;
-        write_ply(&self.0.join("map.ply"), outcome.landmarks.iter().copied(), None)?;
-        let toml = config.to_commented_toml()?;
-        Ok(write_atomically(&self.0.join("config.toml"), |file| file.write_all(toml.as_bytes()))?)
+    pub fn write_poses(&self, trajectory: &[StampedPose], live: &[StampedPose]) -> Result<()> {
+        write_trajectory(&self.0.join(TRAJECTORY_FILE), trajectory)?;
+        Ok(write_trajectory(&self.0.join(LIVE_FILE), live)?)
+    }
+
+    /// Writes trajectories and landmarks.
+    pub fn write(&self, outcome: &Outcome, failures: &mut Failures) {
+        let Outcome { trajectory, keyframes, live, landmarks, .. } = outcome;
+        for (name, poses) in [(TRAJECTORY_FILE, trajectory), (KEYFRAMES_FILE, keyframes), (LIVE_FILE, live)] {
+            failures.keep(write_trajectory(&self.0.join(name), poses));
+        }
+        failures.keep(write_ply(&self.0.join(LANDMARKS_FILE), landmarks.iter().copied(), None));
     }
 
     /// Writes `run.json`.
@@ -76,7 +118,7 @@ impl OutputFolder {
     /// The file cannot be written.
     pub fn write_report(&self, report: &RunReport) -> Result<()> {
         let json = serde_json::to_string_pretty(report)?;
-        Ok(write_atomically(&self.0.join("run.json"), |file| writeln!(file, "{json}"))?)
+        Ok(write_atomically(&self.0.join(RUN_FILE), |file| writeln!(file, "{json}"))?)
     }
 }
 
@@ -88,7 +130,8 @@ pub fn remove_files(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Result<()>
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         if is_ours(&entry.file_name().to_string_lossy()) {
             let path = entry.path();
-            std::fs::remove_file(&path).with_context(|| format!("cannot remove the old {}", path.display()))?;
+            std::fs::remove_file(&path)
+                .with_context(|| format!("cannot remove the old {}; choose another folder", path.display()))?;
         }
     }
     Ok(())

@@ -9,7 +9,7 @@ use yfslam_eval::StampedPose;
 use yfslam_io::write_atomically;
 use yfslam_report::{Frames, MethodReport, Report, Stage, Times};
 
-use super::folder::OutputFolder;
+use super::folder::{OutputFolder, REPORT_FILE};
 use super::processor_time::processor_time;
 use super::report::ReportedRun;
 use crate::input::boxes::BoxOrigin;
@@ -24,7 +24,7 @@ use crate::ui::command_line::command_line;
 /// # Errors
 /// The file cannot be written, or a configuration cannot be.
 pub fn write(out: &OutputFolder, runs: &[ReportedRun], shared: &Stages) -> Result<PathBuf> {
-    let path = out.path().join("report.html");
+    let path = out.path().join(REPORT_FILE);
     let html = page(runs, shared)?;
     write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
     Ok(path)
@@ -96,12 +96,16 @@ fn facts(run: &ReportedRun, boxes: &BoxOrigin) -> Vec<(&'static str, String)> {
         [] => "none".to_owned(),
         faults => faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
     };
-    vec![
+    let interrupted = run
+        .interrupted
+        .map(|interrupted| ("Incomplete", format!("{interrupted} after {} frames", run.result.outcome.frames.total())));
+    let facts = vec![
         ("Sequence", run.sequence.to_owned()),
         ("Faults injected", faults),
         ("Frames", format!("{} in {seconds:.1} s", stamps.len())),
         ("Camera", format!("{width} × {height} px, {}", camera.origin)),
         ("Boxes", boxes.to_string()),
         ("Ground truth", run.truth.map_or("none".to_owned(), |truth| truth.origin.clone())),
-    ]
+    ];
+    facts.into_iter().chain(interrupted).collect()
 }

@@ -4,13 +4,17 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use yfslam::{BoundingBox, DepthImage, Frame, Region, RgbImage, Slam};
+use yfslam_io::prepare_folder;
 use yfslam_io::write::write_color_png;
 
 use super::folder::remove_files;
 use crate::draw::colors::{BOX, DYNAMIC, STATIC, UNMATCHED, WEAK_BOX};
 use crate::draw::shapes::{Color, disc, rectangle, ring, tint};
+
+/// Folder of the images in the output folder.
+const FOLDER: &str = "overlay";
 
 /// Writes one image for each frame.
 pub struct Overlay {
@@ -20,13 +24,14 @@ pub struct Overlay {
 }
 
 impl Overlay {
-    /// Prepares the folder `out/overlay`; removes the images of an earlier run.
+    /// Prepares the folder `out/overlay`.
     ///
     /// # Errors
-    /// An old image cannot be removed.
+    /// Files cannot be written there.
     pub fn prepare(out: &Path, open_score: f32) -> Result<Self> {
-        let folder = out.join("overlay");
-        remove_files(&folder, is_overlay)?;
+        let folder = out.join(FOLDER);
+        prepare_folder(&folder)
+            .with_context(|| format!("--overlay: the folder {} cannot be used", folder.display()))?;
         Ok(Self { folder, open_score })
     }
 
@@ -38,6 +43,18 @@ impl Overlay {
         let image = draw_frame(frame, slam, self.open_score);
         Ok(write_color_png(&self.folder.join(format!("{index:06}.png")), &image)?)
     }
+}
+
+/// Removes the images of an earlier run from the output folder.
+///
+/// # Errors
+/// An image cannot be removed.
+pub fn remove(out: &Path) -> Result<()> {
+    let folder = out.join(FOLDER);
+    remove_files(&folder, is_overlay)?;
+    // It stays if it holds files of others.
+    let _ = std::fs::remove_dir(folder);
+    Ok(())
 }
 
 /// Draws the frame that `slam` tracked last; boxes from `open_score` on open a track.

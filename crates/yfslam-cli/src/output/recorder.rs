@@ -10,8 +10,10 @@ use super::dense;
 use super::folder::OutputFolder;
 use super::overlay::Overlay;
 use super::snapshots::Snapshots;
-use crate::run::dense::DenseResult;
-use crate::run::method_run::RunResult;
+use crate::run::map_args::MapArgs;
+use crate::run::method_run::{Maps, RunResult};
+use crate::run::pipeline::Pipeline;
+use crate::ui::failures::Failures;
 
 /// What a method run leaves behind besides its trajectory.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +42,7 @@ impl Recorder {
     /// Prepares the output of a run of `frames` frames.
     ///
     /// # Errors
-    /// Images of an earlier run cannot be removed.
+    /// A folder cannot be written to.
     pub fn prepare(folder: OutputFolder, config: &Config, frames: usize, outputs: RunOutputs) -> Result<Self> {
         let open_score = config.dynamic.open_score;
         let overlay = outputs.overlay.then(|| Overlay::prepare(folder.path(), open_score)).transpose()?;
@@ -52,31 +54,53 @@ impl Recorder {
         &self.folder
     }
 
-    /// Records the frame that `slam` tracked last.
+    /// Begins to record: removes the results of an earlier run, and writes the configuration.
     ///
     /// # Errors
-    /// A file cannot be written.
-    pub fn record(&mut self, index: usize, frame: &Frame, slam: &Slam) -> Result<()> {
+    /// A file cannot be removed or written.
+    pub fn begin(&self, config: &Config) -> Result<()> {
+        self.folder.remove_results()?;
+        self.folder.write_config(config)
+    }
+
+    /// Records the frame that `slam` tracked last. After an image that cannot be written there are no more.
+    pub fn record(&mut self, index: usize, frame: &Frame, slam: &Slam, failures: &mut Failures) {
         if let Some(snapshots) = &mut self.snapshots {
             snapshots.record(index, frame, slam);
         }
-        match &self.overlay {
-            Some(overlay) => overlay.write(index, frame, slam),
-            None => Ok(()),
+        if let Some(overlay) = &self.overlay
+            && failures.keep(overlay.write(index, frame, slam)).is_none()
+        {
+            self.overlay = None;
         }
     }
 
-    /// Writes the result but for `run.json`; returns the images for the report.
+    /// Writes the trajectories and, if it is to be saved, the map as they are now; nothing if no frame is tracked yet.
     ///
     /// # Errors
-    /// A file cannot be written, or an image is too large for PNG.
-    pub fn write(&self, result: &RunResult, dense: Option<&DenseResult>) -> Result<ReportImages> {
-        self.folder.write(&result.outcome, &result.config)?;
-        if let Some(dense) = dense {
-            dense::write(self.folder.path(), &dense.encoded)?;
+    /// A file cannot be written.
+    pub fn write_checkpoint(&self, pipeline: &mut Pipeline, map: &MapArgs) -> Result<()> {
+        pipeline.finish_mapping();
+        let trajectory = pipeline.trajectory();
+        if trajectory.is_empty() {
+            return Ok(());
         }
-        let Some(snapshots) = &self.snapshots else { return Ok(ReportImages::default()) };
-        let dense = dense.map(|dense| dense::images(&result.config.dense, &dense.map)).transpose()?;
-        Ok(ReportImages { snapshots: snapshots.to_images()?, dense })
+        self.folder.write_poses(&trajectory, pipeline.live())?;
+        map.encode(pipeline).map_or(Ok(()), |encoded| map.write(&encoded?))
+    }
+
+    /// Writes the result but for `run.json`; returns the images for the report.
+    pub fn write(&self, result: &RunResult, maps: Maps, map: &MapArgs, failures: &mut Failures) -> ReportImages {
+        self.folder.write(&result.outcome, failures);
+        if let Some(encoded) = maps.saved.and_then(|encoded| failures.keep(encoded)) {
+            failures.keep(map.write(&encoded));
+        }
+        let dense = maps.dense.and_then(|dense| failures.keep(dense));
+        if let Some(dense) = &dense {
+            failures.keep(dense::write(self.folder.path(), &dense.encoded));
+        }
+        let Some(snapshots) = &self.snapshots else { return ReportImages::default() };
+        let images = dense.and_then(|dense| failures.keep(dense::images(&result.config.dense, &dense.map)));
+        ReportImages { snapshots: failures.keep(snapshots.to_images()).unwrap_or_default(), dense: images }
     }
 }

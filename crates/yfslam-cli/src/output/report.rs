@@ -15,6 +15,7 @@ use crate::stats::process::FrameCost;
 use crate::stats::recognition::RecognitionTally;
 use crate::stats::stages::Stages;
 use crate::stats::tally::{DynamicTally, FrameTally};
+use crate::ui::interrupt::Interrupted;
 
 /// One method run as the reports need it.
 #[derive(Clone, Copy)]
@@ -28,6 +29,8 @@ pub struct ReportedRun<'a> {
     pub images: &'a ReportImages,
     /// Processor time of a frame; `None` where the system does not measure it.
     pub cost: Option<FrameCost>,
+    /// The signal that ended the run before its last frame.
+    pub interrupted: Option<Interrupted>,
 }
 
 /// The content of `run.json`.
@@ -45,6 +48,8 @@ pub struct RunReport<'a> {
     /// Faults put into the frames on purpose.
     pub faults: Vec<String>,
     pub frames: &'a FrameTally,
+    /// Whether a signal ended the run before its last frame.
+    pub interrupted: bool,
     /// The association of colour images with depth or right images; `null` for synthetic worlds.
     pub association: Option<Association>,
     pub dynamic: &'a DynamicTally,
@@ -96,7 +101,7 @@ pub struct Association {
 impl<'a> RunReport<'a> {
     /// Builds the report of one method run.
     pub fn new(run: &ReportedRun<'a>) -> Self {
-        let ReportedRun { sequence, source, faults, truth, result, cost, .. } = *run;
+        let ReportedRun { sequence, source, faults, truth, result, cost, interrupted, .. } = *run;
         let RunResult { config, outcome, boxes, shared, .. } = result;
         Self {
             yfslam: env!("CARGO_PKG_VERSION"),
@@ -107,6 +112,7 @@ impl<'a> RunReport<'a> {
             masks: source.masks.as_ref(),
             faults: faults.iter().map(ToString::to_string).collect(),
             frames: &outcome.frames,
+            interrupted: interrupted.is_some(),
             association: source.association.as_ref().map(Association::from),
             dynamic: &outcome.dynamic,
             loops_and_relocalisation: &outcome.recognition,

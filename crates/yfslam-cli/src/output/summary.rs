@@ -28,6 +28,9 @@ pub fn of_one(report: &RunReport, run: &ReportedRun) -> Result<String> {
         frames.skipped,
         report.fps
     );
+    if let Some(interrupted) = run.interrupted {
+        writeln!(text, "{interrupted} after {} of {} frames", frames.total(), source.stamps_ns.len())?;
+    }
     if frames.skipped > 0 {
         let reasons: Vec<_> =
             frames.skipped_by_reason.iter().map(|(reason, count)| format!("{count} × {reason}")).collect();

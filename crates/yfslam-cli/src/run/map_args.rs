@@ -1,11 +1,11 @@
 //! Saved maps: where a run's map comes from, where it is saved, and on which thread mapping runs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use yfslam::{Execution, MapUse, SavedMap, Slam, SlamBuilder};
-use yfslam_io::write_atomically;
+use yfslam_io::{prepare_folder, read_file, write_atomically};
 
 use super::pipeline::Pipeline;
 
@@ -52,7 +52,7 @@ impl MapArgs {
         let builder = builder.execution(self.execution());
         let Some(path) = &self.load_map else { return Ok(builder.build()?) };
         let map_use = if self.localise { MapUse::Localise } else { MapUse::Extend };
-        let bytes = std::fs::read(path).with_context(|| format!("the map {} cannot be read", path.display()))?;
+        let bytes = read_file(path).with_context(|| format!("the map {} cannot be read", path.display()))?;
         let saved =
             SavedMap::from_bytes(&bytes).with_context(|| format!("{} cannot be used as a map", path.display()))?;
         ensure!(
@@ -70,24 +70,27 @@ impl MapArgs {
     /// The map cannot be written.
     pub fn check(&self) -> Result<()> {
         let Some(path) = &self.save_map else { return Ok(()) };
-        // Another name: an earlier map at `path` stays until it is replaced.
-        let mut probe = path.clone().into_os_string();
-        probe.push(".probe");
-        let probe = PathBuf::from(probe);
-        write_atomically(&probe, |_| Ok(()))
-            .with_context(|| format!("the map {} cannot be written", path.display()))?;
-        // A probe that stays does no harm.
-        let _ = std::fs::remove_file(probe);
-        Ok(())
+        ensure!(!path.is_dir(), "the map {} cannot be written, because it is a folder; name a file", path.display());
+        // Links are followed; the map replaces the file that they lead to. A device has no room to be checked.
+        let target = path.canonicalize().unwrap_or_else(|_| path.clone());
+        if target.exists() && !target.is_file() {
+            return Ok(());
+        }
+        prepare_folder(target.parent().unwrap_or(Path::new("")))
+            .with_context(|| format!("the map {} cannot be written", path.display()))
     }
 
-    /// Writes the map, with the dense map if there is one, if that was asked for.
+    /// Returns the map as the bytes of its file, with the dense map if there is one; `None` if it is not to be saved.
+    pub fn encode(&self, pipeline: &mut Pipeline) -> Option<Result<Vec<u8>>> {
+        self.save_map.as_ref().map(|_| pipeline.save_map())
+    }
+
+    /// Writes the map, if that was asked for.
     ///
     /// # Errors
     /// The file cannot be written; an earlier file then stays.
-    pub fn save(&self, pipeline: &mut Pipeline) -> Result<()> {
+    pub fn write(&self, encoded: &[u8]) -> Result<()> {
         let Some(path) = &self.save_map else { return Ok(()) };
-        let map = pipeline.save_map()?;
-        Ok(write_atomically(path, |file| file.write_all(&map))?)
+        Ok(write_atomically(path, |file| file.write_all(encoded))?)
     }
 }

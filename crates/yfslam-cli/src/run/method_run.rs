@@ -25,6 +25,15 @@ pub struct MethodRun {
     makes_dense_map: bool,
 }
 
+/// The maps that a run leaves behind, encoded.
+#[derive(Default)]
+pub struct Maps {
+    /// The map for a later run, if it is to be saved.
+    pub saved: Option<Result<Vec<u8>>>,
+    /// The dense map, if one is made.
+    pub dense: Option<Result<DenseResult>>,
+}
+
 /// What a run is evaluated with.
 #[derive(Clone, Copy)]
 pub struct EvalContext<'a> {
@@ -86,15 +95,15 @@ impl MethodRun {
         }
     }
 
-    /// Ends the run, saves its map if that was asked for, and evaluates it. Returns the dense map beside the result.
+    /// Ends the run and evaluates it. Returns its maps beside the result.
     ///
     /// # Errors
-    /// There is no trajectory, with the reason, or the map cannot be written.
-    pub fn finish<'a>(self, context: EvalContext<'a>, map: &MapArgs) -> Result<(RunResult<'a>, Option<DenseResult>)> {
+    /// There is no trajectory, with the reason.
+    pub fn finish<'a>(self, context: EvalContext<'a>, map: &MapArgs) -> Result<(RunResult<'a>, Maps)> {
         let Self { config, mut pipeline, makes_dense_map, .. } = self;
         let dense_cost = makes_dense_map.then(|| pipeline.dense_cost());
-        let dense = makes_dense_map.then(|| pipeline.dense_map()).transpose()?;
-        map.save(&mut pipeline)?;
+        let dense = makes_dense_map.then(|| pipeline.dense_map());
+        let saved = map.encode(&mut pipeline);
         let mut outcome = pipeline.finish(&config)?;
         let mut shared = context.reading.clone();
         let needs_boxes = config.dynamic.method.needs_boxes();
@@ -110,7 +119,7 @@ impl MethodRun {
             evaluate_possible(&truth.poses, &outcome.trajectory, options)
         });
         let boxes = if needs_boxes { context.boxes } else { &BoxOrigin::None };
-        Ok((RunResult { config, outcome, boxes, shared, evaluation, dense_cost }, dense))
+        Ok((RunResult { config, outcome, boxes, shared, evaluation, dense_cost }, Maps { saved, dense }))
     }
 }
 

@@ -146,6 +146,16 @@ impl Pipeline {
         &self.frames
     }
 
+    /// Returns the poses of all tracked frames as the map has them now.
+    pub fn trajectory(&self) -> Vec<StampedPose> {
+        self.slam.trajectory().into_iter().map(stamped).collect()
+    }
+
+    /// Returns the poses of all tracked frames as estimated at their time.
+    pub fn live(&self) -> &[StampedPose] {
+        &self.live
+    }
+
     fn log(&mut self, tracked: &Tracked) {
         let (frame, time) = (self.frames.total(), format_stamp(tracked.timestamp_ns));
         if tracked.state != self.state {
@@ -237,7 +247,7 @@ impl Pipeline {
         keyframes.sort_by_key(|&(sequence, ..)| sequence);
         let landmark = |l: &yfslam::Landmark| PlyPoint { position_m: l.position.coords.cast().into(), color: l.color };
         Ok(Outcome {
-            trajectory: self.slam.trajectory().into_iter().map(stamped).collect(),
+            trajectory: self.trajectory(),
             live: self.live,
             keyframes: keyframes.into_iter().map(|(_, t, t_cam_world)| stamped((t, t_cam_world.inverse()))).collect(),
             landmarks: map.landmarks().map(|(_, l)| landmark(l)).collect(),
@@ -254,7 +264,7 @@ impl Pipeline {
     fn fail(&self, config: &Config) -> Result<()> {
         let FrameTally { read, skipped, first_skipped, .. } = &self.frames;
         if *read == 0 {
-            let first = first_skipped.as_deref().unwrap_or("the sequence has no frames");
+            let Some(first) = first_skipped else { bail!("no trajectory: no frame was read") };
             bail!("no trajectory: none of the {skipped} frames can be used; the first: {first}");
         }
         let (features, with_depth) = self.best_start;

@@ -1,6 +1,9 @@
-//! What the user sees: the terminal and the progress of a run.
+//! What the user sees and does: the terminal, the progress of a run, failures that do not end it, and signals that do.
 
 pub mod command_line;
+pub mod failures;
+pub mod interrupt;
+pub mod messages;
 pub mod progress;
 pub mod terminal;
 pub mod verbosity;

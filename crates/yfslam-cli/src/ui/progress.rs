@@ -1,13 +1,13 @@
 //! Progress on standard error: a bar on a terminal, else a line every few seconds; nothing with `--quiet`.
 
-use std::io::Write;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use yfslam::TrackingState;
 
+use super::messages;
+use super::terminal::Terminal;
 use crate::stats::tally::FrameTally;
-use crate::ui::terminal::Terminal;
 
 /// Time between two lines without a bar.
 const LINE_EVERY: Duration = Duration::from_secs(5);
@@ -74,10 +74,9 @@ impl Progress {
             bar.set_position(now as u64);
             bar.set_message(message());
         } else if self.lines && self.last_line.elapsed() >= LINE_EVERY {
-            let line = format!("{}: {now}/{} {items}  {}", self.label, self.total, message());
+            let line = format!("{}: {now}/{} {items}  {}\n", self.label, self.total, message());
             self.last_line = Instant::now();
-            // If standard error is closed, there is no other place for the message.
-            let _ = writeln!(std::io::stderr().lock(), "{line}");
+            messages::write(line.into_bytes());
         }
     }
 

@@ -4,7 +4,8 @@ use std::io::{self, IsTerminal, Write};
 
 use anyhow::Result;
 
-use crate::ui::verbosity::Verbosity;
+use super::messages::{self, MessageWriter};
+use super::verbosity::Verbosity;
 
 /// Prints results, notes and warnings, depending on the verbosity.
 #[derive(Clone, Copy, Debug)]
@@ -21,8 +22,10 @@ impl Terminal {
             2 => tracing::Level::DEBUG,
             _ => tracing::Level::TRACE,
         };
+        // A line that could not be written would be reported on standard error, too, with a panic where that fails.
+        let log = tracing_subscriber::fmt().with_max_level(level).without_time().log_internal_errors(false);
         // Fails only if logging is set up already.
-        let _ = tracing_subscriber::fmt().with_max_level(level).with_writer(io::stderr).without_time().try_init();
+        let _ = log.with_writer(|| MessageWriter).try_init();
         Self { verbosity }
     }
 
@@ -37,6 +40,9 @@ impl Terminal {
     }
 
     /// Prints a result, unless the user chose `--quiet`.
+    ///
+    /// # Errors
+    /// Standard output cannot be written. Commands write their files before they print.
     pub fn result(self, text: &str) -> Result<()> {
         if self.is_quiet() { Ok(()) } else { print(text) }
     }
@@ -52,17 +58,24 @@ impl Terminal {
     pub fn warn(self, text: &str) {
         print_message("warning", text);
     }
+
+    /// Prints an error that does not end the program.
+    pub fn error(self, error: &anyhow::Error) {
+        print_error(error);
+    }
 }
 
 /// Prints to standard output.
 pub fn print(text: &str) -> Result<()> {
+    // On a terminal, messages come before the results that follow them.
+    messages::flush();
     let mut out = io::stdout().lock();
     out.write_all(text.as_bytes())?;
     Ok(out.flush()?)
 }
 
-/// Prints the error that ends the program.
-pub fn error(error: &anyhow::Error) {
+/// Prints an error.
+pub fn print_error(error: &anyhow::Error) {
     print_message("error", &explain(error));
 }
 
@@ -81,8 +94,7 @@ pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
 }
 
 fn print_message(kind: &str, text: &str) {
-    // If standard error is closed, there is no other place for the message.
-    let _ = writeln!(io::stderr().lock(), "{kind}: {text}");
+    messages::write(format!("{kind}: {text}\n").into_bytes());
 }
 
 #[cfg(test)]

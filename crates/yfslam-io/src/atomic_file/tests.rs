@@ -72,3 +72,39 @@ fn a_link_stays_a_link_to_the_new_content() {
     assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
     assert_eq!(fs::read_to_string(&real).unwrap(), "new");
 }
+
+#[test]
+fn files_of_killed_processes_are_removed_and_those_of_running_ones_and_of_others_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (live, _file) = Temporary::create(folder.path()).unwrap();
+    let live_folder = Temporary::create_folder(folder.path()).unwrap();
+    // A killed process leaves files without a lock.
+    fs::write(at(".yfslam-4000000000-7.tmp"), "half a trajectory").unwrap();
+    fs::create_dir(at(".yfslam-4000000000-8.tmp")).unwrap();
+    fs::write(at(".yfslam-4000000000-8.tmp/rgb.txt"), "half a recording").unwrap();
+    let others = [".yfslam-4-7.old", ".yfslam-x-7.tmp", ".yfslam-4.tmp", "yfslam-4-7.tmp", ".yfslam-4-7.tmp.txt"];
+    for other in others {
+        fs::write(at(other), "not ours, or complete").unwrap();
+    }
+    std::os::unix::fs::symlink("/dev/null", at(".yfslam-4-9.tmp")).unwrap();
+    prepare_folder(folder.path()).unwrap();
+    let left = names(folder.path());
+    let own = [live.path(), live_folder.path()].map(|path| path.file_name().unwrap().to_str().unwrap().to_owned());
+    let expected = others.map(str::to_owned).into_iter().chain([".yfslam-4-9.tmp".to_owned()]).chain(own);
+    assert_eq!(left.iter().collect::<std::collections::BTreeSet<_>>(), expected.collect::<Vec<_>>().iter().collect());
+    live.rename_to(&at("poses.txt")).unwrap();
+    assert!(at("poses.txt").is_file());
+}
+
+#[test]
+fn a_folder_that_cannot_be_used_is_refused_with_a_cure() {
+    let folder = tempfile::tempdir().unwrap();
+    prepare_folder(&folder.path().join("a/b")).unwrap();
+    assert_eq!(names(&folder.path().join("a/b")), Vec::<String>::new(), "no probe stays");
+    fs::write(folder.path().join("file"), "").unwrap();
+    for path in [folder.path().join("file"), folder.path().join("file/deeper")] {
+        let error = prepare_folder(&path).unwrap_err().to_string();
+        assert!(error.contains("file") && error.contains("a part of this path is a file"), "{error}");
+    }
+}

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use png::{BitDepth, ColorType, Compression, Encoder};
+use png::{BitDepth, ColorType, Compression, Encoder, EncodingError};
 use yfslam::{Image, RgbImage};
 
 use crate::atomic_file::write_atomically;
@@ -59,15 +59,29 @@ fn encode(
     encoder.set_color(color);
     encoder.set_depth(depth);
     encoder.set_compression(Compression::Fast);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(bytes)?;
-    Ok(writer.finish()?)
+    let mut writer = encoder.write_header().map_err(io_error)?;
+    writer.write_image_data(bytes).map_err(io_error)?;
+    writer.finish().map_err(io_error)
+}
+
+/// Returns the error of the operating system, which says what to do, such as to free some space.
+fn io_error(error: EncodingError) -> io::Error {
+    match error {
+        EncodingError::IoError(error) => error,
+        error => io::Error::other(error),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::decode::{decode_color, decode_depth};
+
+    #[test]
+    fn a_full_device_is_an_error_with_a_cure() {
+        let error = write_color_png(Path::new("/dev/full"), &RgbImage::new(200, 200)).unwrap_err().to_string();
+        assert!(error.contains("free some space"), "{error}");
+    }
 
     #[test]
     fn written_images_decode_to_the_same_pixels() {

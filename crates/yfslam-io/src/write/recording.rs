@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use yfslam::{Camera, Frame, Image};
 
 use super::png::{encode_color, encode_depth, encode_mask};
-use crate::atomic_file::Temporary;
+use crate::atomic_file::{MovedAside, Temporary, prepare_folder};
 use crate::boxes::{BOXES_FILE, BoxList};
 use crate::error::{Error, Result};
 use crate::time::format_stamp;
@@ -57,9 +57,9 @@ impl RecordingWriter {
             let problem = "is not a recording and is therefore not replaced";
             return Err(Error::content(target, problem, "choose another folder, or remove it by hand"));
         }
+        let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        prepare_folder(parent)?;
         let begin = || {
-            let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            fs::create_dir_all(parent)?;
             let temporary = Temporary::create_folder(parent)?;
             for part in ["rgb", paired_folder(stereo), "masks"] {
                 fs::create_dir(temporary.path().join(part))?;
@@ -131,10 +131,10 @@ impl RecordingWriter {
         let Self { temporary, target, replace, .. } = self;
         let fail = |error| Error::write(&target, error);
         // The old recording is moved away only once the new one is complete.
-        let old = replace.then(|| Temporary::aside(&target)).transpose().map_err(fail)?;
+        let old = replace.then(|| MovedAside::new(&target)).transpose().map_err(fail)?;
         if let Err(error) = temporary.rename_to(&target) {
             if let Some(old) = old {
-                old.rename_to(&target).map_err(fail)?;
+                old.move_back_to(&target).map_err(fail)?;
             }
             return Err(fail(error));
         }

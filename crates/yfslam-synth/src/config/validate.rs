@@ -10,7 +10,12 @@ impl WorldConfig {
         let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
         check(self.people <= MAX_PEOPLE, "people", self.people, "between 0 and 6")?;
         let (robots, actors) = (self.actors.robots, &self.actors);
-        check(self.people + robots <= MAX_PEOPLE, "actors.robots", robots, "at most 6 together with the people")?;
+        check(
+            self.people.saturating_add(robots) <= MAX_PEOPLE,
+            "actors.robots",
+            robots,
+            "at most 6 together with the people",
+        )?;
         let movers = usize::from(actors.pushed_chair) + usize::from(actors.carried_box);
         let free = if self.activity == Activity::Walking { self.people } else { 0 };
         check(

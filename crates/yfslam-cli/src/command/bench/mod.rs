@@ -2,24 +2,29 @@
 
 mod benchmark_datasets;
 mod cell;
+mod names;
 mod paper;
 mod runner;
 mod table;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::{Args, value_parser};
-use yfslam_io::write_atomically;
+use yfslam_io::{prepare_folder, write_atomically};
 use yfslam_report::{TableSection, TableStyle, TablesPage};
 
 use self::cell::{Cell, Group};
+use self::names::distinct_names;
 use self::paper::sections;
 use self::runner::Bench;
 use self::table::csv;
 use crate::output::folder::OutputFolder;
 use crate::ui::command_line::command_line;
+use crate::ui::failures::Failures;
+use crate::ui::interrupt::Interrupt;
 use crate::ui::progress::Progress;
 use crate::ui::terminal::Terminal;
 
@@ -42,6 +47,10 @@ Files in the output folder:
 
 Published results:
   If a whole recorded sequence of TUM or Bonn is run, results from papers are added to the tables, marked as published.
+
+Signals:
+  SIGINT (Ctrl-C) and SIGTERM end the bench and its processes, with exit code 130 or 143. Unfinished runs are removed, and finished cells
+  stay: the same command continues the bench.
 
 Processes:
   One process runs all methods on a sequence with one seed, with one thread for each method.";
@@ -81,6 +90,7 @@ pub struct BenchArgs {
 }
 
 pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
+    let interrupt = Interrupt::watch()?;
     let datasets = args.known.as_deref().map(benchmark_datasets::find).transpose()?;
     let missing = datasets.as_ref().map_or("", |datasets| &datasets.missing);
     for line in missing.lines() {
@@ -88,6 +98,7 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
     }
     let groups = args.groups(datasets.as_ref().map(|datasets| datasets.folders.as_slice()))?;
     let out = OutputFolder::prepare(args.out.as_deref(), "bench")?;
+    ["cells", "tables"].iter().try_for_each(|part| prepare_folder(&out.path().join(part)))?;
     let program = std::env::current_exe().context("cannot find the file of this program")?;
     let binary = std::fs::read(&program).with_context(|| format!("cannot read {}", program.display()))?;
     let bench = Bench {
@@ -96,35 +107,48 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
         program_crc32: format!("{:08x}", crc32fast::hash(&binary)),
         jobs: args.jobs.into(),
         extra: args.extra.clone(),
+        interrupt,
     };
     let progress = Mutex::new(Progress::new(terminal, "bench", groups.iter().map(|group| group.methods.len()).sum()));
     let cells = bench.cells(&groups, |done| {
         if let Ok(mut progress) = progress.lock() {
             progress.at(done, "cells", String::new);
         }
-    })?;
+    });
     if let Ok(progress) = progress.into_inner() {
         progress.finish();
     }
+    let cells = cells?;
     for cell in cells.iter().filter(|cell| cell.failure.is_some()) {
         let failure = cell.failure.as_deref().unwrap_or_default();
         terminal.warn(&format!("{} with {}, seed {}: {failure}", cell.sequence, cell.method, cell.seed));
     }
     let sections = sections(&cells);
-    let page = write(out.path(), args, &cells, &sections, missing)?;
+    let mut failures = Failures::new(terminal);
+    let page = write(out.path(), args, &cells, &sections, missing, &mut failures);
     let overview = sections.first().map_or(String::new(), |section| section.table.render(TableStyle::Markdown));
-    terminal.result(&format!("{overview}\nwritten to {}\nreport: {}\n", out.path().display(), page.display()))
+    let summary = format!("{overview}\nwritten to {}\nreport: {}\n", out.path().display(), page.display());
+    let printed = terminal.result(&summary);
+    failures.check()?;
+    printed
 }
 
 /// Writes the tables in all formats; returns the path of the page.
-fn write(out: &Path, args: &BenchArgs, cells: &[Cell], sections: &[TableSection], missing: &str) -> Result<PathBuf> {
+fn write(
+    out: &Path,
+    args: &BenchArgs,
+    cells: &[Cell],
+    sections: &[TableSection],
+    missing: &str,
+    failures: &mut Failures,
+) -> PathBuf {
     let mut text = String::new();
     for TableSection { id, title, about, table } in sections {
         text += &format!("## {title}\n\n{about}\n\n{}\n", table.render(TableStyle::Markdown));
         for (extension, style) in [("csv", TableStyle::Csv), ("tex", TableStyle::Latex)] {
             let table = table.render(style);
             let path = out.join("tables").join(format!("{id}.{extension}"));
-            write_atomically(&path, |file| file.write_all(table.as_bytes()))?;
+            failures.keep(write_atomically(&path, |file| file.write_all(table.as_bytes())));
         }
     }
     if !missing.is_empty() {
@@ -145,36 +169,76 @@ fn write(out: &Path, args: &BenchArgs, cells: &[Cell], sections: &[TableSection]
     let page = TablesPage { title, facts, sections, version, command: command_line() }.html();
     let path = out.join("report.html");
     for (path, text) in [(&out.join("table.md"), &text), (&out.join("cells.csv"), &csv(cells)), (&path, &page)] {
-        write_atomically(path, |file| file.write_all(text.as_bytes()))?;
+        failures.keep(write_atomically(path, |file| file.write_all(text.as_bytes())));
     }
-    Ok(path)
+    path
+}
+
+/// What the user wants to be run.
+enum Input {
+    /// Folder of a sequence.
+    Recording(PathBuf),
+    /// Synthetic world.
+    World(String),
+}
+
+impl Input {
+    fn folder(&self) -> Option<&Path> {
+        match self {
+            Self::Recording(folder) => Some(folder),
+            Self::World(_) => None,
+        }
+    }
+
+    /// Returns what is the same for different paths to the same folder.
+    fn place(&self) -> PathBuf {
+        match self {
+            Self::Recording(folder) => folder.canonicalize().unwrap_or_else(|_| folder.clone()),
+            Self::World(spec) => format!("synth:{}", spec.strip_prefix("synth:").unwrap_or(spec)).into(),
+        }
+    }
 }
 
 impl BenchArgs {
     /// Returns what to run, sequence by sequence.
     fn groups(&self, known: Option<&[PathBuf]>) -> Result<Vec<Group>> {
-        if let Some(folders) = known {
-            return Ok(folders.iter().flat_map(|folder| self.recorded(folder)).collect());
-        }
         let suite = || yfslam_synth::names().into_iter().map(str::to_owned).collect();
-        let sequences = if self.sequences.is_empty() { suite() } else { self.sequences.clone() };
-        let mut groups = Vec::new();
-        for sequence in &sequences {
-            if Path::new(sequence).is_dir() {
-                let folders = benchmark_datasets::sequences_in(Path::new(sequence))?;
-                groups.extend(folders.iter().flat_map(|folder| self.recorded(folder)));
+        let sequences = if self.sequences.is_empty() && known.is_none() { suite() } else { self.sequences.clone() };
+        let mut inputs: Vec<Input> = known.unwrap_or_default().iter().cloned().map(Input::Recording).collect();
+        for sequence in sequences {
+            if Path::new(&sequence).is_dir() {
+                let folders = benchmark_datasets::sequences_in(Path::new(&sequence))?;
+                inputs.extend(folders.into_iter().map(Input::Recording));
             } else {
                 // Checked before the first run.
-                yfslam_synth::parse(sequence).with_context(|| format!("{sequence} is not a folder either"))?;
-                groups.extend((1..=self.seeds).map(|seed| self.world(sequence, seed)));
+                yfslam_synth::parse(&sequence).with_context(|| format!("{sequence} is not a folder either"))?;
+                inputs.push(Input::World(sequence));
             }
+        }
+        let mut known = BTreeSet::new();
+        inputs.retain(|input| known.insert(input.place()));
+        let folders: Vec<&Path> = inputs.iter().filter_map(Input::folder).collect();
+        let mut names = distinct_names(&folders).into_iter();
+        let group = |input: &Input| match input {
+            Input::Recording(folder) => self.recorded(folder, &names.next().unwrap_or_default()),
+            Input::World(spec) => (1..=self.seeds).map(|seed| self.world(spec, seed)).collect(),
+        };
+        let groups: Vec<Group> = inputs.iter().flat_map(group).collect();
+        let mut files: BTreeMap<String, &str> = BTreeMap::new();
+        for group in &groups {
+            let other = files.insert(group.key(), &group.source).unwrap_or(&group.source);
+            ensure!(
+                other == group.source,
+                "the results of {other} and of {} would have the same names ({}); rename one of the folders",
+                group.source,
+                group.key()
+            );
         }
         Ok(groups)
     }
 
-    /// Returns the runs of a recording, one for each seed.
-    fn recorded(&self, folder: &Path) -> Vec<Group> {
-        let name = folder.file_name().unwrap_or(folder.as_os_str()).to_string_lossy();
+    /// Returns the runs of a recording with this name in the tables, one for each seed.
+    fn recorded(&self, folder: &Path, name: &str) -> Vec<Group> {
         let has_option = |option: &str| self.extra.iter().any(|argument| argument.split('=').next() == Some(option));
         let changes = ["--start", "--end", "--reverse", "--fault", "--depth-factor"];
         let whole = self.frames.is_none() && !changes.iter().any(|option| has_option(option));
@@ -183,7 +247,7 @@ impl BenchArgs {
             let mut options = vec!["--seed".to_owned(), seed.to_string()];
             options.extend(self.frames.into_iter().flat_map(|frames| ["--end".to_owned(), frames.to_string()]));
             options.extend(camera.into_iter().flat_map(|camera| ["--camera".to_owned(), camera.to_owned()]));
-            Group { whole, ..self.group(&name, folder.display().to_string(), seed, options) }
+            Group { whole, ..self.group(name, folder.display().to_string(), seed, options) }
         };
         (1..=self.seeds).map(group).collect()
     }

@@ -117,7 +117,9 @@ impl Errors {
     }
 
     fn push_published(&self, sequence: &str, table: &mut Table) {
-        for figure in published(sequence, self.measure) {
+        // The name follows those of parent folders, where several recordings have the same name.
+        let name = sequence.rsplit('/').next().unwrap_or(sequence);
+        for figure in published(name, self.measure) {
             let std = figure.std.map_or(String::new(), |std| std.to_string());
             let none = String::new;
             let source = format!("{PUBLISHED}: {}", figure.source);

@@ -3,18 +3,24 @@
 //!
 //! In: groups of cells. Out: the cells, each of which is saved as JSON and not run again.
 
+use std::io::Read;
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 
 use super::cell::{Cell, Group};
 use crate::output::folder::FAILURE_FILE;
+use crate::ui::interrupt::{Interrupt, Interrupted};
 
 /// Files that a method writes at its end, with or without success.
 const RESULTS: [&str; 2] = ["run.json", FAILURE_FILE];
+
+/// Time between two looks at a process.
+const POLL: Duration = Duration::from_millis(20);
 
 /// Runs and saves cells.
 pub struct Bench {
@@ -28,20 +34,23 @@ pub struct Bench {
     pub jobs: usize,
     /// Options of every `yfslam run`.
     pub extra: Vec<String>,
+    /// Ends the bench.
+    pub interrupt: Interrupt,
 }
 
 impl Bench {
     /// Returns the cells of `groups` in their order, and runs those that are missing. `report` gets the number of finished cells.
     ///
     /// # Errors
-    /// A run cannot be started or a cell cannot be written. The failure of a method is stored in its cell.
+    /// A run cannot be started, or a signal has ended the bench; cells that are finished are saved. The failure of a method is stored in
+    /// its cell.
     pub fn cells(&self, groups: &[Group], report: impl Fn(usize) + Sync) -> Result<Vec<Cell>> {
         let (next, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let cells = Mutex::new(Vec::new());
         let work = || {
             loop {
                 let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(group) = groups.get(index) else { return };
+                let Some(group) = groups.get(index).filter(|_| self.interrupt.received().is_none()) else { return };
                 let result = self.group(group);
                 if let Ok(mut cells) = cells.lock() {
                     cells.push((index, result));
@@ -50,6 +59,7 @@ impl Bench {
             }
         };
         std::thread::scope(|scope| (0..self.jobs.max(1)).for_each(|_| drop(scope.spawn(work))));
+        self.interrupt.check()?;
         let mut groups = cells.into_inner().unwrap_or_else(PoisonError::into_inner);
         groups.sort_by_key(|&(index, _)| index);
         Ok(groups.into_iter().map(|(_, cells)| cells).collect::<Result<Vec<_>>>()?.concat())
@@ -87,6 +97,9 @@ impl Bench {
     }
 
     /// Runs some methods of a group, each into its own folder. Returns the error message of the program if it failed.
+    ///
+    /// # Errors
+    /// The program cannot be started, or a signal has ended it; then its unfinished folders are removed.
     fn run(&self, group: &Group, methods: &[&str]) -> Result<Option<String>> {
         let folder = self.folder_of(group);
         for method in methods {
@@ -97,15 +110,58 @@ impl Bench {
         }
         // A single method writes directly to the output folder.
         let out = if let [method] = methods { folder.join(method) } else { folder };
-        let output = Command::new(&self.program)
+        let mut child = Command::new(&self.program)
             .args(group.arguments(methods, &self.extra))
             .arg("--quiet")
             .arg("--out")
             .arg(&out)
-            .output()
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
             .with_context(|| format!("cannot start {}", self.program.display()))?;
-        let message = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-        Ok((!output.status.success()).then_some(message))
+        let (status, message) = self.wait(&mut child)?;
+        if let Some(interrupted) = self.interrupt.received().or_else(|| signal_of(status)) {
+            self.remove_unfinished(group, methods);
+            return Err(interrupted.into());
+        }
+        Ok((!status.success()).then_some(message))
+    }
+
+    /// Waits for the end of a process, or ends it after a signal. Returns what it wrote to standard error, too.
+    fn wait(&self, child: &mut Child) -> Result<(ExitStatus, String)> {
+        let mut errors = child.stderr.take();
+        std::thread::scope(|scope| {
+            let reader = scope.spawn(move || {
+                let mut bytes = Vec::new();
+                // A message that is cut short is better than none.
+                let _ = errors.as_mut().map(|errors| errors.read_to_end(&mut bytes));
+                String::from_utf8_lossy(&bytes).trim().to_owned()
+            });
+            let status = loop {
+                if self.interrupt.received().is_some() {
+                    // Its folders are removed, so that it need not end in order. It fails if the process has ended already.
+                    let _ = child.kill();
+                    break child.wait()?;
+                }
+                match child.try_wait()? {
+                    Some(status) => break status,
+                    None => std::thread::sleep(POLL),
+                }
+            };
+            Ok((status, reader.join().unwrap_or_default()))
+        })
+    }
+
+    /// Removes the folders of methods that have not ended; those of other methods in the folder of the group stay.
+    fn remove_unfinished(&self, group: &Group, methods: &[&str]) {
+        let folder = self.folder_of(group);
+        for method in methods {
+            // What stays is overwritten when the bench continues.
+            let _ = std::fs::remove_dir_all(folder.join(method));
+        }
+        // It stays if it holds results of other methods.
+        let _ = std::fs::remove_dir(folder);
     }
 
     fn folder_of(&self, group: &Group) -> PathBuf {
@@ -115,6 +171,11 @@ impl Bench {
     fn path_of(&self, group: &Group, method: &str) -> PathBuf {
         self.folder.join("cells").join(format!("{}-{method}.json", group.key()))
     }
+}
+
+/// Returns the signal that ended the process, if it was sent to the process and not to the bench.
+fn signal_of(status: ExitStatus) -> Option<Interrupted> {
+    status.code().and_then(Interrupted::of_exit_code)
 }
 
 #[cfg(all(test, unix))]
@@ -137,8 +198,14 @@ echo '{\"evaluation\":{\"ate\":{\"translation_m\":{\"rmse\":0.5}}}}' > \"$out/ru
         let program = folder.path().join("program");
         std::fs::write(&program, CRASHES).unwrap();
         std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
-        let bench =
-            Bench { folder: folder.path().into(), program, program_crc32: String::new(), jobs: 1, extra: Vec::new() };
+        let bench = Bench {
+            folder: folder.path().into(),
+            program,
+            program_crc32: String::new(),
+            jobs: 1,
+            extra: Vec::new(),
+            interrupt: Interrupt::watch().unwrap(),
+        };
         let group = Group {
             sequence: "world".into(),
             source: "synth:world".into(),

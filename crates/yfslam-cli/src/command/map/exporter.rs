@@ -13,7 +13,7 @@ use yfslam_io::write::{
     Labels, OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png, write_nav2,
     write_octomap, write_pcd, write_ply, write_ply_mesh,
 };
-use yfslam_io::write_atomically;
+use yfslam_io::{prepare_folder, write_atomically};
 
 use super::options::HeightBand;
 use crate::draw::colors::{FREE, class_color};
@@ -126,6 +126,8 @@ impl Exporter<'_> {
     /// Writes images of the keyframes with most people, without these people.
     pub fn background(&self) -> Result<String> {
         let DenseMap { grid, patches, .. } = self.map;
+        let folder = self.folder.join("background");
+        prepare_folder(&folder)?;
         let cells = grid.rays().len();
         let moving = |number: usize| (0..cells).filter(|cell| patches[number].patch.moves(*cell)).count();
         let mut most_hidden: Vec<(usize, usize)> = (0..patches.len()).map(|number| (moving(number), number)).collect();
@@ -140,7 +142,7 @@ impl Exporter<'_> {
             let Some(view) = views.of_patch(number) else { continue };
             let colors = (0..cells).map(|cell| patch.color(cell)).collect();
             let original = RgbImage::from_vec(view.color.width(), view.color.height(), colors).unwrap_or_default();
-            write_view(&self.folder.join("background"), &format!("{number:06}"), &original, &view)?;
+            write_view(&folder, &format!("{number:06}"), &original, &view)?;
             hidden += moving;
             filled += view.valid.data().iter().filter(|valid| **valid).count() + moving - cells;
         }

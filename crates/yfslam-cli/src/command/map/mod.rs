@@ -12,12 +12,15 @@ use clap::Args;
 use nalgebra::{UnitQuaternion, Vector3};
 use yfslam::dense::classes;
 use yfslam::dense::{DenseConfig, DenseMap, check_products};
+use yfslam_io::{prepare_folder, read_file};
 
 use self::exporter::{Exporter, with_progress};
 use self::options::{HeightBand, Up};
 use crate::input::settings::SettingsArgs;
 use crate::output::dense::DENSE_FILE;
 use crate::stats::cpu;
+use crate::ui::failures::Failures;
+use crate::ui::interrupt::Interrupt;
 use crate::ui::terminal::Terminal;
 
 const HELP: &str = "\
@@ -36,6 +39,9 @@ Files in the output folder:
   mesh.ply                  with --mesh, coloured triangles
   background/               with --background, the keyframes with most people: original image, image without people, depth image
                             (1/5000 m) and mask of the known pixels
+
+  Each file is written whole or not at all. After SIGINT (Ctrl-C) or SIGTERM, the command ends with the product at work, with exit
+  code 130 or 143; a second signal ends it at once.
 
 Classes:
   If the detector of the run knows classes beside movable objects, such as the 80 classes of COCO, the map has classes:
@@ -98,8 +104,10 @@ pub struct DenseMapArgs {
 }
 
 pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
+    let interrupt = Interrupt::watch()?;
     let config = args.config()?;
     let (map, folder) = args.open()?;
+    prepare_folder(&folder).with_context(|| format!("the output folder {} cannot be used", folder.display()))?;
     terminal.note(&printer::memory_bound(&config, &map));
     let turn = args.turn(&map);
     let started = Instant::now();
@@ -116,23 +124,23 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     let all = !(args.cloud || args.octomap || args.grid || args.mesh || args.background);
     // Nothing is written if a product would take too much memory.
     check_products(&exporter.volume, args.cloud || all, args.mesh || all)?;
-    text += &exporter.legend()?;
-    if args.cloud || all {
-        text += &exporter.cloud()?;
+    let products: [(bool, &dyn Fn() -> Result<String>); 6] = [
+        (true, &|| exporter.legend()),
+        (args.cloud || all, &|| exporter.cloud()),
+        (args.octomap || all, &|| exporter.octomap()),
+        (args.grid || all, &|| exporter.grid(args.band)),
+        (args.mesh || all, &|| exporter.mesh()),
+        (args.background || all, &|| exporter.background()),
+    ];
+    let mut failures = Failures::new(terminal);
+    for (_, make) in products.iter().filter(|(is_wanted, _)| *is_wanted) {
+        // Products that are complete stay.
+        interrupt.check()?;
+        text += &failures.keep(make()).unwrap_or_default();
     }
-    if args.octomap || all {
-        text += &exporter.octomap()?;
-    }
-    if args.grid || all {
-        text += &exporter.grid(args.band)?;
-    }
-    if args.mesh || all {
-        text += &exporter.mesh()?;
-    }
-    if args.background || all {
-        text += &exporter.background()?;
-    }
-    terminal.result(&format!("{text}\nwritten to {}\n", exporter.folder.display()))
+    let printed = terminal.result(&format!("{text}\nwritten to {}\n", exporter.folder.display()));
+    failures.check()?;
+    printed
 }
 
 impl DenseMapArgs {
@@ -149,7 +157,7 @@ impl DenseMapArgs {
     /// Returns the dense map, and the folder for its products.
     fn open(&self) -> Result<(DenseMap, PathBuf)> {
         let file = if self.run.is_dir() { self.run.join(DENSE_FILE) } else { self.run.clone() };
-        let bytes = std::fs::read(&file).with_context(|| {
+        let bytes = read_file(&file).with_context(|| {
             format!("cannot read {}; make it with `yfslam run SEQUENCE --dense`, or check the path", file.display())
         })?;
         let map = DenseMap::from_bytes(&bytes).with_context(|| format!("{} cannot be used", file.display()))?;

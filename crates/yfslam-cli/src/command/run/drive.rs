@@ -1,8 +1,11 @@
 //! Takes the frames of a source through one or more methods.
 
+use std::time::Instant;
+
 use anyhow::{Result, bail};
 use yfslam::{Config, Frame, Method};
 
+use super::checkpoint::Checkpoints;
 use crate::input::detector::LoadedDetector;
 use crate::input::settings::describe;
 use crate::input::source::Source;
@@ -14,6 +17,8 @@ use crate::run::shared_detector::SharedDetector;
 use crate::stats::process::{ProcessMeter, ProcessTime};
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
+use crate::ui::failures::Failures;
+use crate::ui::interrupt::{Interrupt, Interrupted};
 use crate::ui::progress::Progress;
 use crate::ui::terminal::{Terminal, explain};
 
@@ -21,8 +26,7 @@ use crate::ui::terminal::{Terminal, explain};
 pub struct RecordedRun {
     run: MethodRun,
     recorder: Recorder,
-    /// The error that ended it early.
-    failure: Option<anyhow::Error>,
+    failures: Failures,
 }
 
 /// The result of a method, with what the reports show of it.
@@ -39,10 +43,21 @@ pub struct Setup<'a> {
     pub map: &'a MapArgs,
     pub outputs: RunOutputs,
     pub makes_dense_map: bool,
+    pub terminal: Terminal,
+}
+
+/// How the frames were processed.
+pub struct Driven {
+    /// Durations of reading.
+    pub reading: Stages,
+    pub process: ProcessTime,
+    /// The signal that ended the run before its last frame.
+    pub interrupted: Option<Interrupted>,
 }
 
 impl Setup<'_> {
-    /// Prepares one run for each method. A detector belongs to the only method, or is shared.
+    /// Prepares one run for each method. A detector belongs to the only method, or is shared. Once everything can be used, the results of
+    /// an earlier run are removed from the output folders.
     ///
     /// # Errors
     /// The configuration, the detector, a map or an output folder cannot be used.
@@ -60,50 +75,68 @@ impl Setup<'_> {
             let folder = if is_only { out.clone() } else { out.for_method(describe(*method).0)? };
             let recorder = Recorder::prepare(folder, &config, self.source.stamps_ns.len(), self.outputs)?;
             let run = MethodRun::prepare(config, self.source, own.take(), self.makes_dense_map, self.map)?;
-            anyhow::Ok(RecordedRun { run, recorder, failure: None })
+            anyhow::Ok(RecordedRun { run, recorder, failures: Failures::new(self.terminal) })
         };
-        let runs = methods.iter().map(run).collect::<Result<_>>()?;
-        Ok((runs, shared.map(|detector| SharedDetector::new(detector, self.config)).transpose()?))
+        let runs = methods.iter().map(run).collect::<Result<Vec<_>>>()?;
+        let shared = shared.map(|detector| SharedDetector::new(detector, self.config)).transpose()?;
+        out.remove_results()?;
+        runs.iter().try_for_each(|RecordedRun { run, recorder, .. }| recorder.begin(&run.config))?;
+        Ok((runs, shared))
     }
 }
 
 impl RecordedRun {
-    /// Processes one frame, unless an earlier one failed.
+    /// Processes one frame.
     fn process(&mut self, frame: &Result<Frame, Skip>) {
-        if self.failure.is_some() {
-            return;
-        }
         self.run.process(frame);
         if let Ok(frame) = frame {
             let index = self.run.pipeline.frames().total() - 1;
-            self.failure = self.recorder.record(index, frame, self.run.pipeline.slam()).err();
+            self.recorder.record(index, frame, self.run.pipeline.slam(), &mut self.failures);
         }
     }
 
-    fn finish<'a>(self, context: EvalContext<'a>, map: &MapArgs) -> Result<RecordedResult<'a>> {
-        let Self { run, recorder, failure } = self;
-        if let Some(failure) = failure {
-            return Err(failure);
+    /// Saves the results so far. A file that cannot be written now is written at the next checkpoint or at the end.
+    fn save_checkpoint(&mut self, map: &MapArgs, terminal: Terminal) {
+        let started = Instant::now();
+        if let Err(error) = self.recorder.write_checkpoint(&mut self.run.pipeline, map) {
+            terminal.warn(&format!("no checkpoint: {}", explain(&error)));
         }
-        let (result, dense) = run.finish(context, map)?;
-        let images = recorder.write(&result, dense.as_ref())?;
+        self.run.pipeline.stages.push("checkpoint", started.elapsed());
+    }
+
+    fn finish<'a>(
+        self,
+        context: EvalContext<'a>,
+        map: &MapArgs,
+        failures: &mut Failures,
+    ) -> Result<RecordedResult<'a>> {
+        let Self { run, recorder, failures: earlier } = self;
+        failures.add(&earlier);
+        let (result, maps) = run.finish(context, map)?;
+        let images = recorder.write(&result, maps, map, failures);
         Ok(RecordedResult { result, images, folder: recorder.folder().clone() })
     }
 }
 
-/// Takes all frames of the source through all runs, with a thread for each run. Returns the durations of reading, and the processor time.
+/// Takes the frames of the source through all runs, with a thread for each run, until the last frame or a signal.
 pub fn drive(
     source: &mut Source,
     mut detector: Option<&mut SharedDetector>,
     runs: &mut [RecordedRun],
+    map: &MapArgs,
+    mut checkpoints: Checkpoints,
+    interrupt: &Interrupt,
     terminal: Terminal,
-) -> (Stages, ProcessTime) {
+) -> Driven {
     let mut progress = Progress::new(terminal, &source.name, source.stamps_ns.len());
     let mut reading = Stages::default();
     let mut meter = ProcessMeter::start();
-    while runs.iter().any(|run| run.failure.is_none())
-        && let Some(frame) = source.frames.next(&mut reading)
-    {
+    let interrupted = loop {
+        let interrupted = interrupt.received();
+        if interrupted.is_some() {
+            break interrupted;
+        }
+        let Some(frame) = source.frames.next(&mut reading) else { break None };
         let frames = distribute(frame, detector.as_deref_mut(), runs);
         std::thread::scope(|scope| {
             let mut work = runs.iter_mut().zip(&frames);
@@ -119,9 +152,14 @@ pub fn drive(
         if let Some(RecordedRun { run, .. }) = runs.first() {
             progress.frame(run.pipeline.frames(), run.state);
         }
-    }
+        checkpoints.save_if_due(|| runs.iter_mut().for_each(|run| run.save_checkpoint(map, terminal)));
+    };
     progress.finish();
-    (reading, meter.finish())
+    if let Some(interrupted) = interrupted {
+        terminal
+            .note(&format!("{interrupted}; results are being written, and a second signal ends the program at once"));
+    }
+    Driven { reading, process: meter.finish(), interrupted }
 }
 
 /// Returns the frame for each run, with boxes from the shared detector, if there is one.
@@ -139,7 +177,8 @@ fn distribute(
     runs.iter().map(frame_for).collect()
 }
 
-/// Ends all runs and writes their files. A method of several that has no result only gives a warning.
+/// Ends all runs and writes their files. A method of several that has no result only gives a warning, and a file that cannot be written
+/// is reported.
 ///
 /// # Errors
 /// No method has a trajectory.
@@ -147,6 +186,7 @@ pub fn finish<'a>(
     runs: Vec<RecordedRun>,
     context: EvalContext<'a>,
     map: &MapArgs,
+    failures: &mut Failures,
     terminal: Terminal,
 ) -> Result<Vec<RecordedResult<'a>>> {
     let is_only = runs.len() == 1;
@@ -154,12 +194,12 @@ pub fn finish<'a>(
     for recorded in runs {
         let folder = recorded.recorder.folder().clone();
         let (name, _) = describe(recorded.run.config.dynamic.method);
-        match recorded.finish(context, map) {
+        match recorded.finish(context, map, failures) {
             Ok(result) => results.push(result),
             Err(error) if is_only => return Err(error),
             Err(error) => {
                 terminal.warn(&format!("{name}: {}", explain(&error)));
-                folder.write_failure(&explain(&error))?;
+                failures.keep(folder.write_failure(&explain(&error)));
             }
         }
     }

@@ -1,9 +1,11 @@
 //! `yfslam run`: tracks a sequence with one method or several.
 
+mod checkpoint;
 mod drive;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Command, FromArgMatches};
@@ -11,7 +13,8 @@ use yfslam::config::DepthSource;
 use yfslam::{Config, Method};
 use yfslam_report::{TableStyle, evaluation_table};
 
-use self::drive::{RecordedResult, Setup, drive, finish};
+use self::checkpoint::Checkpoints;
+use self::drive::{Driven, RecordedResult, Setup, drive, finish};
 use crate::input::boxes;
 use crate::input::detector::DetectorArgs;
 use crate::input::settings::{MethodArg, SettingsArgs, describe};
@@ -26,6 +29,8 @@ use crate::run::evaluation::EvaluationArgs;
 use crate::run::map_args::MapArgs;
 use crate::run::method_run::{EvalContext, RunResult};
 use crate::run::shared_detector::{DetectionTally, SharedDetector};
+use crate::ui::failures::Failures;
+use crate::ui::interrupt::Interrupt;
 use crate::ui::terminal::{Terminal, explain};
 
 const HELP: &str = "\
@@ -40,6 +45,7 @@ Examples:
   yfslam run DIR --dense --save-map lab.map                        adds a dense map, for `yfslam map lab.map`
   yfslam run DIR --masks DIR/masks                                 uses your own segmentation
   yfslam run DIR --sensor mono                                     uses the colour images only
+  yfslam run DIR --save-map lab.map --checkpoint 30                saves trajectory and map every 30 s
   yfslam run DIR --detect-every 3                                  runs the detector on every third frame
   yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
 
@@ -53,6 +59,9 @@ Files in the output folder:
   dense.map       with --dense, the input of `yfslam map`
   overlay/        with --overlay, one image for each frame
   report.html     with --report, one page with errors, figures, images and times
+
+  Each file is written whole or not at all. When a run begins, files of these names are removed, except config.toml: those that an
+  earlier run left are never taken for results of this one. Incomplete files of killed runs (.yfslam-*.tmp) are removed, too.
 
 Detections:
   The methods boxes, yf, ds, dyna and full need the bounding boxes of people. Without --detector, boxes come from the synthetic world or
@@ -74,8 +83,14 @@ A single camera (--sensor mono):
 Kinds of faults (--fault):
   dropped, repeated, blank, black, frozen, late, depth-dropout, nan-stamp, covered
 
+Signals:
+  After SIGINT (Ctrl-C) or SIGTERM, the run ends with all files for the frames so far, and run.json has \"interrupted\": true. A second
+  signal ends the program at once; then the files of the last --checkpoint stay.
+
 Exit status:
-  Success if at least one method produced a trajectory.";
+  0    at least one method produced a trajectory, and all files were written
+  1    an error: no method produced a trajectory, or a file could not be written; all other files were
+  130  SIGINT, and 143  SIGTERM: all files were written for the frames until then";
 
 /// Evenly spread snapshots in the report of one method.
 const SNAPSHOTS: usize = 5;
@@ -116,6 +131,9 @@ pub struct RunArgs {
     /// Write `report.html`, a page with errors, figures, images and times.
     #[arg(long, help_heading = "Output")]
     report: bool,
+    /// Save trajectory.txt, live.txt and, with --save-map, the map at this interval of wall time, so that a killed run loses no more.
+    #[arg(long, value_name = "SECONDS", value_parser = checkpoint::parse_interval, help_heading = "Output")]
+    checkpoint: Option<Duration>,
     /// Ground truth, in TUM format or in the format of the folder [default: the ground truth in the folder].
     #[arg(long, value_name = "FILE", help_heading = "Evaluation")]
     groundtruth: Option<PathBuf>,
@@ -124,6 +142,7 @@ pub struct RunArgs {
 }
 
 pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
+    let interrupt = Interrupt::watch()?;
     let mut config = args.settings.resolve()?;
     let methods = args.methods(&config)?;
     let max_diff_ns = args.evaluation.max_diff_ns()?;
@@ -141,19 +160,26 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     }
     let truth = find_truth(args, &source, terminal)?;
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
-    args.map.check()?;
+    args.check_map(&out)?;
     let snapshots = args.report.then_some(if methods.len() == 1 { SNAPSHOTS } else { SNAPSHOTS_OF_EACH });
     let outputs = RunOutputs { overlay: args.overlay, snapshots };
-    let setup = Setup { source: &source, config: &config, map: &args.map, outputs, makes_dense_map: args.dense };
+    let setup =
+        Setup { source: &source, config: &config, map: &args.map, outputs, makes_dense_map: args.dense, terminal };
     let (mut runs, mut shared) = setup.prepare(&methods, &out, detector)?;
-    let (reading, process) = drive(&mut source, shared.as_mut(), &mut runs, terminal);
+    let checkpoints = Checkpoints::new(args.checkpoint);
+    let driven = drive(&mut source, shared.as_mut(), &mut runs, &args.map, checkpoints, &interrupt, terminal);
+    let Driven { reading, process, interrupted } = driven;
 
     let detection = shared.map_or_else(DetectionTally::default, SharedDetector::into_tally);
     let (reading, truth) = (&reading, truth.as_ref());
     let alignment = args.evaluation.alignment(config.depth.source != DepthSource::Motion);
     let context =
         EvalContext { source: &source, truth, max_diff_ns, alignment, boxes: &boxes, reading, detection: &detection };
-    let results = finish(runs, context, &args.map, terminal)?;
+    let mut failures = Failures::new(terminal);
+    let results = match (finish(runs, context, &args.map, &mut failures, terminal), interrupted) {
+        (Err(error), Some(interrupted)) => return Err(anyhow::Error::from(interrupted).context(explain(&error))),
+        (results, _) => results?,
+    };
     let only_results: Vec<&RunResult> = results.iter().map(|recorded| &recorded.result).collect();
     let costs = frame_costs(&process, &detection, &only_results);
     let (sequence, faults) = (args.source.sequence.as_str(), args.source.faults.as_slice());
@@ -169,26 +195,34 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
             result,
             images,
             cost,
+            interrupted,
         })
         .collect();
+    let mut text = String::new();
     for (run, RecordedResult { folder, .. }) in runs.iter().zip(&results) {
         let report = RunReport::new(run);
-        folder.write_report(&report)?;
+        failures.keep(folder.write_report(&report));
         if methods.len() == 1 {
-            terminal.result(&summary::of_one(&report, run)?)?;
+            text += &summary::of_one(&report, run)?;
         }
     }
-    let page = args.report.then(|| html::write(&out, &runs, &reading.and(&detection.stages))).transpose()?;
+    let page = args.report.then(|| html::write(&out, &runs, &reading.and(&detection.stages)));
+    let page = page.and_then(|page| failures.keep(page));
     if methods.len() > 1 {
-        terminal.result(&summary::of_several(&runs, truth))?;
+        text += &summary::of_several(&runs, truth);
     } else if let Some(evaluation) = only_results.first().and_then(|result| result.evaluation()) {
-        terminal.result(&format!("\n{}", evaluation_table(evaluation, TableStyle::Plain)))?;
+        text += &format!("\n{}", evaluation_table(evaluation, TableStyle::Plain));
     }
-    terminal.result(&format!("\nwritten to {}\n", out.path().display()))?;
+    text += &format!("\nwritten to {}\n", out.path().display());
     if let Some(page) = page {
-        terminal.result(&format!("report: {}\n", page.display()))?;
+        text += &format!("report: {}\n", page.display());
     }
-    check_accuracy(args, &only_results, terminal)
+    // Standard output may be closed, so all files are written before.
+    let printed = terminal.result(&text);
+    failures.check()?;
+    interrupt.check()?;
+    check_accuracy(args, &only_results, terminal)?;
+    printed
 }
 
 impl RunArgs {
@@ -199,6 +233,20 @@ impl RunArgs {
     pub fn parse(arguments: &[OsString]) -> Result<Self> {
         let command = Self::augment_args(Command::new("yfslam run").no_binary_name(true));
         Ok(Self::from_arg_matches(&command.try_get_matches_from(arguments)?)?)
+    }
+
+    /// Checks before a run that its map can be saved after it, in a file of its own.
+    ///
+    /// # Errors
+    /// The map cannot be written, or would replace another file of the run.
+    fn check_map(&self, out: &OutputFolder) -> Result<()> {
+        let clash = self.map.save_map.as_ref().filter(|path| out.has_result(path));
+        ensure!(
+            clash.is_none(),
+            "--save-map {} is the name of another file of this run; choose another name, such as lab.map",
+            clash.map_or_else(String::new, |path| path.display().to_string())
+        );
+        self.map.check()
     }
 
     /// Returns the requested methods, each once; else the method of the configuration.
