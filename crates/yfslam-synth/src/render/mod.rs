@@ -34,13 +34,22 @@ pub struct Rendering {
 }
 
 impl Rendering {
-    fn new(pixels: usize) -> Self {
+    /// Creates an empty rendering of so many pixels.
+    pub fn new(pixels: usize) -> Self {
         Self {
             color: vec![[0.0; 3]; pixels],
             depth: vec![0.0; pixels],
             instance: vec![0; pixels],
             reflectance: vec![0.0; pixels],
         }
+    }
+
+    /// Appends the rows below this rendering.
+    pub fn append(&mut self, below: Self) {
+        self.color.extend(below.color);
+        self.depth.extend(below.depth);
+        self.instance.extend(below.instance);
+        self.reflectance.extend(below.reflectance);
     }
 }
 
@@ -61,12 +70,7 @@ pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antial
         })
         .collect();
     let mut rendering = Rendering::new(0);
-    for band in bands {
-        rendering.color.extend(band.color);
-        rendering.depth.extend(band.depth);
-        rendering.instance.extend(band.instance);
-        rendering.reflectance.extend(band.reflectance);
-    }
+    bands.into_iter().for_each(|band| rendering.append(band));
     rendering
 }
 

@@ -95,14 +95,42 @@ impl RayTable {
                 tiles[(row / TILE) * across + column / TILE].include(x[i], y[i]);
             }
         }
-        let pitch = [1.0 / camera.fx as f32, 1.0 / camera.fy as f32];
+        Self::with_tiles(width, height, stride, [x, y], tiles, [1.0 / camera.fx as f32, 1.0 / camera.fy as f32])
+    }
+
+    /// Completes the table from the exact ranges of its tiles.
+    fn with_tiles(
+        width: usize,
+        height: usize,
+        stride: usize,
+        [x, y]: [Vec<f32>; 2],
+        mut tiles: Vec<Rect>,
+        pitch: [f32; 2],
+    ) -> Self {
         for tile in &mut tiles {
             // Anti-aliasing samples up to half a pixel beyond the pixel centres.
             tile.x = [tile.x[0] - pitch[0], tile.x[1] + pitch[0]];
             tile.y = [tile.y[0] - pitch[1], tile.y[1] + pitch[1]];
         }
-        let bands = tiles.chunks(across).map(|row| row.iter().copied().fold(Rect::empty(), Rect::union)).collect();
+        let bands =
+            tiles.chunks(stride / TILE).map(|row| row.iter().copied().fold(Rect::empty(), Rect::union)).collect();
         Self { width, height, stride, x, y, tiles, bands, pitch }
+    }
+
+    /// Returns the rays of `row` and its neighbours, and the place of the row among them.
+    pub fn strip(&self, row: usize) -> (Self, usize) {
+        let (first, last) = (row.saturating_sub(1), (row + 1).min(self.height - 1));
+        let rows = (0..TILE).map(|k| (first + k).min(last));
+        let cut = |all: &[f32]| -> Vec<f32> {
+            rows.clone().flat_map(|y| &all[y * self.stride..(y + 1) * self.stride]).copied().collect()
+        };
+        let (x, y) = (cut(&self.x), cut(&self.y));
+        let mut tiles = vec![Rect::empty(); self.stride / TILE];
+        for (i, (x, y)) in x.iter().zip(&y).enumerate() {
+            tiles[i % self.stride / TILE].include(*x, *y);
+        }
+        let strip = Self::with_tiles(self.width, last - first + 1, self.stride, [x, y], tiles, self.pitch);
+        (strip, row - first)
     }
 
     /// Returns the range of the whole image.
