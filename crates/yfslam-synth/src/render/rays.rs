@@ -19,13 +19,17 @@ pub struct Rect {
 }
 
 impl Rect {
-    fn empty() -> Self {
-        Self { x: [f32::INFINITY, f32::NEG_INFINITY], y: [f32::INFINITY, f32::NEG_INFINITY] }
-    }
+    /// The range of nothing.
+    pub const EMPTY: Self = Self { x: [f32::INFINITY, f32::NEG_INFINITY], y: [f32::INFINITY, f32::NEG_INFINITY] };
 
     fn include(&mut self, x: f32, y: f32) {
         self.x = [self.x[0].min(x), self.x[1].max(x)];
         self.y = [self.y[0].min(y), self.y[1].max(y)];
+    }
+
+    /// Returns the rectangle with a border of the given widths in x and y.
+    pub fn grown(self, [x, y]: [f32; 2]) -> Self {
+        Self { x: [self.x[0] - x, self.x[1] + x], y: [self.y[0] - y, self.y[1] + y] }
     }
 
     /// Returns the smallest rectangle around both.
@@ -88,53 +92,34 @@ impl RayTable {
         let x: Vec<f32> = rays.iter().map(|r| r[0] as f32).collect();
         let y: Vec<f32> = rays.iter().map(|r| r[1] as f32).collect();
         let across = stride / TILE;
-        let mut tiles = vec![Rect::empty(); across * (rows / TILE)];
+        let mut tiles = vec![Rect::EMPTY; across * (rows / TILE)];
         for row in 0..rows {
             for column in 0..stride {
                 let i = row * stride + column;
                 tiles[(row / TILE) * across + column / TILE].include(x[i], y[i]);
             }
         }
-        Self::with_tiles(width, height, stride, [x, y], tiles, [1.0 / camera.fx as f32, 1.0 / camera.fy as f32])
-    }
-
-    /// Completes the table from the exact ranges of its tiles.
-    fn with_tiles(
-        width: usize,
-        height: usize,
-        stride: usize,
-        [x, y]: [Vec<f32>; 2],
-        mut tiles: Vec<Rect>,
-        pitch: [f32; 2],
-    ) -> Self {
+        let pitch = [1.0 / camera.fx as f32, 1.0 / camera.fy as f32];
         for tile in &mut tiles {
             // Anti-aliasing samples up to half a pixel beyond the pixel centres.
-            tile.x = [tile.x[0] - pitch[0], tile.x[1] + pitch[0]];
-            tile.y = [tile.y[0] - pitch[1], tile.y[1] + pitch[1]];
+            *tile = tile.grown(pitch);
         }
-        let bands =
-            tiles.chunks(stride / TILE).map(|row| row.iter().copied().fold(Rect::empty(), Rect::union)).collect();
+        let bands = tiles.chunks(across).map(|row| row.iter().copied().fold(Rect::EMPTY, Rect::union)).collect();
         Self { width, height, stride, x, y, tiles, bands, pitch }
     }
 
-    /// Returns the rays of `row` and its neighbours, and the place of the row among them.
-    pub fn strip(&self, row: usize) -> (Self, usize) {
-        let (first, last) = (row.saturating_sub(1), (row + 1).min(self.height - 1));
-        let rows = (0..TILE).map(|k| (first + k).min(last));
-        let cut = |all: &[f32]| -> Vec<f32> {
-            rows.clone().flat_map(|y| &all[y * self.stride..(y + 1) * self.stride]).copied().collect()
-        };
-        let (x, y) = (cut(&self.x), cut(&self.y));
-        let mut tiles = vec![Rect::empty(); self.stride / TILE];
-        for (i, (x, y)) in x.iter().zip(&y).enumerate() {
-            tiles[i % self.stride / TILE].include(*x, *y);
+    /// Returns the range of the part of `row` in the tile that starts at `column`.
+    pub fn chunk(&self, row: usize, column: usize) -> Rect {
+        let start = row * self.stride + column;
+        let mut rect = Rect::EMPTY;
+        for (x, y) in self.x[start..start + TILE].iter().zip(&self.y[start..start + TILE]) {
+            rect.include(*x, *y);
         }
-        let strip = Self::with_tiles(self.width, last - first + 1, self.stride, [x, y], tiles, self.pitch);
-        (strip, row - first)
+        rect.grown(self.pitch)
     }
 
     /// Returns the range of the whole image.
     pub fn view(&self) -> Rect {
-        self.bands.iter().copied().fold(Rect::empty(), Rect::union)
+        self.bands.iter().copied().fold(Rect::EMPTY, Rect::union)
     }
 }

@@ -9,17 +9,15 @@ mod shoot;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use yfslam::{BoundingBox, Camera, DepthImage, Detection, Frame, Image, RgbImage};
+use yfslam::{BoundingBox, Camera, Detection, Frame, Image, RgbImage};
 
 use crate::actors::Actors;
 use crate::bake::Baker;
 use crate::camera_path::CameraPath;
 use crate::config::{WorldConfig, WorldError, default_camera};
-use crate::render::Rendering;
 use crate::render::rays::RayTable;
 use crate::rng::hash;
 use crate::scene::Scene;
-use crate::sensor;
 use crate::sensor::exposure::Meter;
 use crate::sensor::shutter::Shutter;
 use crate::surfaces::Surfaces;
