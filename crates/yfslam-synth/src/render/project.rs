@@ -64,9 +64,9 @@ pub fn project_triangle(v: &[Vector3<f64>; 3], mesh: u8, triangle: u32, view: &R
 }
 
 /// Returns the range of the triangle with corners `v` in camera coordinates.
-pub fn bounds(v: &[Vector3<f64>; 3]) -> Rect {
+fn bounds(v: &[Vector3<f64>; 3]) -> Rect {
     if v.iter().any(|p| p.z < NEAR_M) {
-        return Rect { x: [f32::NEG_INFINITY, f32::INFINITY], y: [f32::NEG_INFINITY, f32::INFINITY] };
+        return Rect::EVERYTHING;
     }
     let [x, y] = [v.map(|p| (p.x / p.z) as f32), v.map(|p| (p.y / p.z) as f32)];
     let range = |a: [f32; 3]| [a[0].min(a[1]).min(a[2]), a[0].max(a[1]).max(a[2])];

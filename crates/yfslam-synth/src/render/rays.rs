@@ -19,6 +19,8 @@ pub struct Rect {
 }
 
 impl Rect {
+    /// The range of everything.
+    pub const EVERYTHING: Self = Self { x: [f32::NEG_INFINITY, f32::INFINITY], y: [f32::NEG_INFINITY, f32::INFINITY] };
     /// The range of nothing.
     pub const EMPTY: Self = Self { x: [f32::INFINITY, f32::NEG_INFINITY], y: [f32::INFINITY, f32::NEG_INFINITY] };
 

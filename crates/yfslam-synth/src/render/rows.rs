@@ -12,17 +12,18 @@ use rayon::prelude::*;
 
 use super::Rendering;
 use super::paint::Painter;
-use super::project::{self, NEAR_M, Projected, project_triangle};
+use super::project::{NEAR_M, Projected, project_triangle};
 use super::raster::{Visibility, draw_row};
 use super::rays::{RayTable, Rect, TILE};
 use super::shade::View;
+use crate::mesh::{Mesh, Vec3};
 
 /// Border around the places of a triangle at both ends of a band, px: more than it leaves them by in between, where it moves
 /// unevenly. A foot that swings with 200 m/s² at 1 m leaves the chord by 0.15 px within the 3 ms of a band of the longest readout.
 const BORDER_PX: f32 = 2.0;
 /// Cosine between the outward normal of a triangle and the ray, beyond which it faces away over the whole band if it does at both
 /// ends. In between, the angle leaves the chord by less than 0.001 rad.
-const AWAY: f64 = 0.01;
+const AWAY: f32 = 0.01;
 
 /// A triangle that may touch a band.
 struct Candidate {
@@ -42,8 +43,12 @@ struct Window {
 
 /// Renders an image of which row k shows `views[k]`; there is one view per row.
 pub fn render_rows(rays: &RayTable, views: &[View], antialias: bool) -> Rendering {
-    let bands = views.par_chunks(TILE).enumerate();
-    let windows: Vec<Window> = bands.flat_map_iter(|(band, views)| draw_band(rays, views, band)).collect();
+    // The places of all vertices at the first row of every band and at the last row of all.
+    let ends = (0..=views.len().div_ceil(TILE)).into_par_iter().map(|band| (band * TILE).min(views.len().max(1) - 1));
+    let places: Vec<[Vec<Place>; 2]> = ends.filter_map(|row| views.get(row)).map(places).collect();
+    let bands = views.par_chunks(TILE).zip(places.par_windows(2)).enumerate();
+    let windows: Vec<Window> =
+        bands.flat_map_iter(|(band, (views, ends))| draw_band(rays, views, ends, band * TILE)).collect();
     if let Some(view) = views.first() {
         let runs = windows.iter().flat_map(|window| {
             let runs = window.seen.triangle.chunk_by(|a, b| a == b);
@@ -62,10 +67,18 @@ pub fn render_rows(rays: &RayTable, views: &[View], antialias: bool) -> Renderin
     rendering
 }
 
-/// Draws the rows of a band from the views of each.
-fn draw_band(rays: &RayTable, views: &[View], band: usize) -> Vec<Window> {
-    let rows = band * TILE..band * TILE + views.len();
-    let candidates = candidates(rays, &views[0], &views[views.len() - 1], rows.clone());
+/// Returns the places of all vertices of both meshes.
+fn places(view: &View) -> [Vec<Place>; 2] {
+    [0, 1].map(|mesh: u8| {
+        let count = view.meshes[usize::from(mesh)].vertices.len() as u32;
+        (0..count).map(|vertex| Place::new(&view.in_camera(mesh, vertex))).collect()
+    })
+}
+
+/// Draws the rows of a band that starts at row `first` from the view of each.
+fn draw_band(rays: &RayTable, views: &[View], ends: &[[Vec<Place>; 2]], first: usize) -> Vec<Window> {
+    let rows = first..first + views.len();
+    let candidates = candidates(rays, views[0].meshes, ends, rows.clone());
     rows.zip(views).map(|(row, view)| draw(rays, view, row, &candidates)).collect()
 }
 
@@ -99,26 +112,23 @@ fn draw(rays: &RayTable, view: &View, row: usize, candidates: &[Candidate]) -> W
     Window { triangles, seen }
 }
 
-/// Returns the triangles that may touch `rows`, or their neighbours, between the time of the first and that of the last of them.
-fn candidates(rays: &RayTable, first: &View, last: &View, rows: Range<usize>) -> Vec<Candidate> {
+/// Returns the triangles that may touch `rows`, or their neighbours, while their vertices move between the places at both `ends`.
+fn candidates(rays: &RayTable, meshes: [&Mesh; 2], ends: &[[Vec<Place>; 2]], rows: Range<usize>) -> Vec<Candidate> {
     let across = rays.stride / TILE;
     let border = rays.pitch.map(|size| BORDER_PX * size);
     // The range of each column of tiles.
-    let ends = rows.start.saturating_sub(1)..(rows.end + 1).min(rays.height);
+    let rows = rows.start.saturating_sub(1)..(rows.end + 1).min(rays.height);
     let tiles: Vec<Rect> = (0..across)
-        .map(|tile| ends.clone().map(|row| rays.chunk(row, tile * TILE)).fold(Rect::EMPTY, Rect::union).grown(border))
+        .map(|tile| rows.clone().map(|row| rays.chunk(row, tile * TILE)).fold(Rect::EMPTY, Rect::union).grown(border))
         .collect();
     let band = tiles.iter().copied().fold(Rect::EMPTY, Rect::union);
     let mut found = Vec::new();
-    for (number, mesh) in (0u8..).zip(first.meshes) {
-        let place = |view: &View| -> Vec<Vector3<f64>> {
-            (0..mesh.vertices.len() as u32).map(|index| view.in_camera(number, index)).collect()
-        };
-        let places = [first, last].map(place);
+    for (number, mesh) in (0u8..).zip(meshes) {
         for (index, triangle) in (0u32..).zip(&mesh.triangles) {
-            let corners = places.each_ref().map(|places| triangle.vertices.map(|vertex| places[vertex as usize]));
-            let bounds = project::bounds(&corners[0]).union(project::bounds(&corners[1]));
-            if !bounds.overlaps(&band) || corners.iter().all(is_hidden) {
+            let corners = |end: &[Vec<Place>; 2]| triangle.vertices.map(|k| end[usize::from(number)][k as usize]);
+            let mut bounds = Rect::EMPTY;
+            ends.iter().flat_map(corners).for_each(|place| bounds = bounds.union(place.range()));
+            if !bounds.overlaps(&band) || ends.iter().all(|end| is_hidden(&corners(end))) {
                 continue;
             }
             let touched = |tile: &Rect| bounds.overlaps(tile);
@@ -132,8 +142,33 @@ fn candidates(rays: &RayTable, first: &View, last: &View, rows: Range<usize>) ->
     found
 }
 
+/// The place of a vertex at the end of a band.
+#[derive(Clone, Copy)]
+struct Place {
+    /// In camera coordinates, m.
+    point: Vec3,
+    /// In normalised image coordinates, if it lies in front of the camera.
+    image: Option<[f32; 2]>,
+}
+
+impl Place {
+    fn new(point: &Vector3<f64>) -> Self {
+        let image = (point.z >= NEAR_M).then(|| [(point.x / point.z) as f32, (point.y / point.z) as f32]);
+        Self { point: point.cast(), image }
+    }
+
+    /// Returns where triangles with this corner may lie on its account: anywhere if it is behind the camera.
+    fn range(&self) -> Rect {
+        match self.image {
+            Some([x, y]) => Rect { x: [x, x], y: [y, y] },
+            None => Rect::EVERYTHING,
+        }
+    }
+}
+
 /// Returns whether a triangle clearly faces away or lies behind the camera.
-fn is_hidden(v: &[Vector3<f64>; 3]) -> bool {
+fn is_hidden(corners: &[Place; 3]) -> bool {
+    let v = corners.map(|corner| corner.point);
     let normal = (v[1] - v[0]).cross(&(v[2] - v[0]));
-    v.iter().all(|p| p.z < 0.5 * NEAR_M) || normal.dot(&v[0]) > AWAY * normal.norm() * v[0].norm()
+    corners.iter().all(|corner| corner.image.is_none()) || normal.dot(&v[0]) > AWAY * normal.norm() * v[0].norm()
 }

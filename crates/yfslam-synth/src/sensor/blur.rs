@@ -131,4 +131,22 @@ mod tests {
         let (columns, rows, _) = smeared_dot(Isometry3::rotation(Vector3::new(0.008, 0.0, 0.0)));
         assert!(columns == 1 && (4..=6).contains(&rows), "{columns} {rows}");
     }
+
+    #[test]
+    fn rows_of_a_rolling_image_are_blurred_as_if_the_whole_image_had_been_taken_at_their_time() {
+        let Camera { fx, fy, .. } = default_camera();
+        let camera = Camera::pinhole(64, 48, fx, fy, 32.0, 24.0);
+        for (pitch, line) in [(0.008, 0.0), (0.008, 0.05), (-0.008, 0.05), (0.008, -0.05)] {
+            let motion = Isometry3::rotation(Vector3::new(pitch, 0.0, 0.0));
+            let moved = CameraMove::between(&Isometry3::identity(), &motion).with_line(line);
+            // A pattern y² that moves down by `dy` per exposure appears stretched in a rolling image.
+            let dy = pitch * fy;
+            let shown = |row: usize| ((row as f64 - 24.0) * (1.0 - dy * line)).powi(2) as f32;
+            let color: Vec<[f32; 3]> = (0..64 * 48).map(|i| [shown(i / 64); 3]).collect();
+            let out = smear(&color, &vec![2.0; 64 * 48], &RayTable::new(&camera), |_| moved);
+            // The mean of a square over a path is more than the square in its middle by a twelfth of the squared length.
+            let more = f64::from(out[24 * 64 + 32][0] - color[24 * 64 + 32][0]) / (dy * dy / 12.0);
+            assert!((more - 1.0).abs() < 0.15, "{pitch} {line}: {more}");
+        }
+    }
 }

@@ -92,15 +92,25 @@ impl World {
     ) -> RgbImage {
         let (sensor, (width, height)) = (&self.config.sensor, (rays.width, rays.height));
         let gain = self.config.light.exposure * self.meter.gain(shutter.middle_s, |at| self.brightness(at));
-        let motion = |row: usize| {
-            let time = shutter.time(row as f64, height);
-            let [open, close] = [-0.5, 0.5].map(|part| self.path.pose(time + part * sensor.exposure_s) * mount);
-            CameraMove::between(&open, &close).with_line(shutter.line_s(height) / sensor.exposure_s)
-        };
+        let motion = |row: usize| self.motion(shutter, sensor.exposure_s, mount, row, height);
         let smeared =
             (sensor.exposure_s > 0.0).then(|| sensor::blur::smear(&rendering.color, &rendering.depth, rays, motion));
         let linear = smeared.as_ref().unwrap_or(&rendering.color);
         sensor::color::develop(linear, width, height, gain, sensor.color_noise, seed)
+    }
+
+    /// Returns the motion of the camera at `mount` while `row` of an image of `rows` rows is exposed.
+    fn motion(
+        &self,
+        shutter: &Shutter,
+        exposure_s: f64,
+        mount: &Isometry3<f64>,
+        row: usize,
+        rows: usize,
+    ) -> CameraMove {
+        let time = shutter.time(row as f64, rows);
+        let [open, close] = [-0.5, 0.5].map(|part| self.path.pose(time + part * exposure_s) * mount);
+        CameraMove::between(&open, &close).with_line(shutter.line_s(rows) / exposure_s)
     }
 
     /// Computes the depth image, whose rows may show the world at other times than those of the colour image.
@@ -179,6 +189,40 @@ mod tests {
                     assert!(count == 0 && color < 1e-3, "{spec}: {count} pixels and {color} of row {row} differ");
                 }
             }
+        }
+    }
+    /// Returns the squared difference of a blurred image from the mean of the images while the shutter is open, relative to that of
+    /// a sharp image.
+    fn blur_error(world: &World, shutter: &Shutter, exposure_s: f64) -> f32 {
+        let mount = Isometry3::identity();
+        // Lamps are clipped, or they would count for more than all the rest.
+        let shoot = |middle_s: f64| {
+            let mut image = world.shoot(&world.rays, &Shutter { middle_s, ..*shutter }, &mount);
+            image.color.iter_mut().for_each(|rgb| *rgb = rgb.map(|c| c.min(1.0)));
+            image
+        };
+        let sharp = shoot(shutter.middle_s);
+        let mut mean = vec![[0.0f32; 3]; sharp.color.len()];
+        for k in 0..15 {
+            let one = shoot(shutter.middle_s + exposure_s * ((f64::from(k) + 0.5) / 15.0 - 0.5));
+            mean.iter_mut().zip(&one.color).for_each(|(sum, rgb)| (0..3).for_each(|c| sum[c] += rgb[c] / 15.0));
+        }
+        let motion = |row| world.motion(shutter, exposure_s, &mount, row, 120);
+        let blurred = sensor::blur::smear(&sharp.color, &sharp.depth, &world.rays, motion);
+        let error = |image: &[[f32; 3]]| -> f32 {
+            image.iter().zip(&mean).map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f32>()).sum()
+        };
+        error(&blurred) / error(&sharp.color)
+    }
+
+    #[test]
+    fn blur_is_the_mean_of_the_images_while_the_shutter_is_open() {
+        for frame in [20, 45] {
+            let world = rolling("walking_rpy?seed=2&people=0", 50.0, true);
+            let shutter = world.color_shutter(frame);
+            let rolling = blur_error(&world, &shutter, 0.06);
+            let global = blur_error(&world, &Shutter { readout_s: 0.0, ..shutter }, 0.06);
+            assert!(rolling < 0.5 && rolling < 1.1 * global, "frame {frame}: {rolling}, of a global shutter {global}");
         }
     }
 }
