@@ -57,6 +57,7 @@ mod light;
 mod look_at;
 mod mesh;
 mod render;
+mod rig;
 mod rng;
 mod scene;
 mod sensor;

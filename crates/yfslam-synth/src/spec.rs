@@ -32,6 +32,12 @@ const KEYS: &[(&str, &str)] = &[
     ("blur", "exposure time in ms; 0 is off"),
     ("autoexposure", "on or off"),
     ("offset_ms", "ms from the colour image to its depth image, such as 12; 0 is off"),
+    (
+        "readout",
+        "ms from the first to the last row of an image, -100 to 100; negative reads the bottom row first, 0 all rows at once",
+    ),
+    ("depth_readout", "the same for the depth image; as for the colour image unless given"),
+    ("unknown_readout", "on or off: on leaves the readout out of the calibration of the camera"),
     ("holes", "on or off: pixels without depth at edges, on grazing and on dark surfaces"),
     ("boxes", "on or off: exact person boxes as detections"),
     ("shadows", "on or off"),
@@ -59,7 +65,9 @@ pub fn parse(spec: &str) -> Result<WorldConfig, WorldError> {
     parse_with_camera(spec, default_camera(), WorldConfig::default().depth_factor)
 }
 
-/// Parses a description for another camera than the default and its depth units per metre; its `width`, `height` and `fps` change that camera.
+/// Parses a description for another camera than the default and its depth units per metre; its `width`, `height` and `fps` change
+/// that camera, and so does `readout`. The calibration has the readout if the description or the camera mentions it, unless the
+/// description has `unknown_readout=on`.
 ///
 /// # Errors
 /// As for [`parse`], also if `camera` cannot be rendered.
@@ -67,19 +75,38 @@ pub fn parse_with_camera(spec: &str, camera: Camera, depth_factor: f64) -> Resul
     let fail = |reason: String| WorldError::Spec { spec: spec.to_owned(), reason };
     let (name, query) = split(spec);
     let mut config = WorldConfig { camera, depth_factor, ..WorldConfig::default() };
+    config.sensor.readout_ms = config.camera.readout_ms.unwrap_or_default();
+    config.sensor.depth_readout_ms = config.camera.depth_readout_ms;
     let world =
         find(name).ok_or_else(|| fail(format!("unknown world `{name}`; the worlds are {}", names().join(", "))))?;
     world.apply(&mut config);
+    let mut tells_readout = true;
     for pair in query.split('&').filter(|pair| !pair.is_empty()) {
         let (key, value) =
             pair.split_once('=').ok_or_else(|| fail(format!("`{pair}` is not of the form key=value")))?;
-        set(&mut config, key, value).map_err(fail)?;
+        if key == "unknown_readout" {
+            tells_readout = !switch(key, value).map_err(fail)?;
+        } else {
+            set(&mut config, key, value).map_err(fail)?;
+        }
     }
     if config.stereo_m > 0.0 {
         config.camera.bf = config.stereo_m * config.camera.fx;
     }
+    calibrate_readout(&mut config, tells_readout);
     config.validate().map_err(|error| fail(error.to_string()))?;
     Ok(config)
+}
+
+/// Writes the readout of the sensor into the calibration of the camera, or removes it there. A camera whose shutter nobody has
+/// mentioned stays without, as most calibrations are. The stamp of the depth image contains its whole offset; no delay remains.
+fn calibrate_readout(config: &mut WorldConfig, tells: bool) {
+    let sensor = &config.sensor;
+    let tells = tells && config.camera.readout_ms.is_some();
+    let has_depth = tells && config.stereo_m == 0.0;
+    config.camera.readout_ms = tells.then_some(sensor.readout_ms);
+    config.camera.depth_readout_ms = has_depth.then_some(sensor.depth_readout());
+    config.camera.depth_delay_ms = has_depth.then_some(0.0);
 }
 
 fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
@@ -121,6 +148,14 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
         }
         "blur" => config.sensor.exposure_s = 1e-3 * number::<f64>(key, value)?,
         "offset_ms" => config.sensor.depth_offset_s = 1e-3 * number::<f64>(key, value)?,
+        "readout" => {
+            config.sensor.readout_ms = number(key, value)?;
+            camera.readout_ms = Some(config.sensor.readout_ms);
+        }
+        "depth_readout" => {
+            config.sensor.depth_readout_ms = Some(number(key, value)?);
+            camera.readout_ms = Some(config.sensor.readout_ms);
+        }
         "autoexposure" => {
             let adapts = switch(key, value)?;
             config.sensor.auto_exposure = if adapts { SensorConfig::default().auto_exposure } else { 0.0 };
@@ -193,6 +228,26 @@ mod tests {
         assert!((on.exposure_s - 0.02).abs() < 1e-12 && (on.depth_offset_s + 0.012).abs() < 1e-12);
         assert!(on.auto_exposure > 0.0 && on.holes && on.min_return > 0.0);
         assert!(message("walking_xyz?offset_ms=5000").contains("between -1 and 1 s"));
+    }
+
+    #[test]
+    fn the_calibration_has_the_readout_that_a_spec_or_a_camera_mentions() {
+        let told = |spec: &str| {
+            let WorldConfig { camera, sensor, .. } = parse(spec).unwrap();
+            let calibrated = (camera.readout_ms, camera.depth_readout_ms, camera.depth_delay_ms);
+            ((sensor.readout_ms, sensor.depth_readout()), calibrated)
+        };
+        assert_eq!(told("walking_xyz"), ((0.0, 0.0), (None, None, None)));
+        assert_eq!(told("walking_xyz?readout=0"), ((0.0, 0.0), (Some(0.0), Some(0.0), Some(0.0))));
+        let both = (Some(30.0), Some(-20.0), Some(0.0));
+        assert_eq!(told("walking_xyz?depth_readout=-20&readout=30"), ((30.0, -20.0), both));
+        let unknown = "walking_xyz?unknown_readout=true&readout=30";
+        assert_eq!(told(unknown), ((30.0, 30.0), (None, None, None)));
+        assert_eq!(told("walking_xyz?readout=30&stereo=0.11"), ((30.0, 30.0), (Some(30.0), None, None)));
+        let rolling = parse_with_camera("walking_xyz", default_camera().with_readout_ms(25.0), 5000.0).unwrap();
+        assert_eq!((rolling.sensor.readout_ms, rolling.camera.readout_ms), (25.0, Some(25.0)));
+        assert!(message("walking_xyz?readout=101").contains("between -100 and 100 ms"));
+        assert!(message("walking_xyz?depth_readout=-101").contains("between -100 and 100 ms"));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! All that moves: people, robots, and objects that are pushed, carried or displaced.
 //!
-//! In: a scene, a configuration and a seed. Out: at any time, the posed meshes of all actors and the spheres that darken their
+//! In: a scene, a configuration and a seed. Out: at any time, the poses and meshes of all actors and the spheres that darken their
 //! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried object, displaced box. Objects that
 //! are never moved (desks, the chairs of the scene) are not actors.
 
@@ -14,16 +14,18 @@ mod tests;
 pub mod tour_walker;
 pub mod walkway;
 
+use nalgebra::Isometry3;
 use yfslam::Camera;
 
 use crate::camera_path::CameraPath;
 use crate::config::{Activity, CarriedObject, WorldConfig};
 use crate::light::{Lights, Occluder};
 use crate::mesh::{Mesh, Vec3};
+use crate::rig::Rig;
 use crate::scene::Scene;
 use displaced::DisplacedBox;
 use people::body::Body;
-use people::skeleton::BonePoses;
+use people::skeleton::{BONES, BonePoses};
 use people::tasks::{self, Task};
 use people::{Person, Plan, upright};
 use rigid_actor::RigidActor;
@@ -56,6 +58,16 @@ enum Motion {
 pub struct Actors {
     people: Vec<Person>,
     rigid_actors: Vec<(RigidActor, Motion)>,
+    rig: Rig,
+}
+
+/// The poses of all actors at one time.
+#[derive(Clone, Debug)]
+pub struct Poses {
+    /// Poses of the bones of [`Actors::rig`].
+    pub bones: Vec<Isometry3<f32>>,
+    /// Spheres that darken their surroundings, in world coordinates.
+    pub occluders: Vec<Occluder>,
 }
 
 impl Actors {
@@ -65,7 +77,7 @@ impl Actors {
             (0..config.people).map(|k| Body::new(k as u8 + 1, &mut scene.palette, config.seed)).collect();
         let person = |(k, body)| Person::new(body, plan(scene, config, path, k), config.seed, k);
         let people: Vec<Person> = bodies.into_iter().enumerate().map(person).collect();
-        let mut actors = Self { people, rigid_actors: Vec::new() };
+        let mut actors = Self { people, rigid_actors: Vec::new(), rig: Rig::default() };
         let wanted = &config.actors;
         for robot in 0..wanted.robots {
             let route = route(scene, config, path, config.people + robot, 0.5);
@@ -91,7 +103,7 @@ impl Actors {
                 RigidActor::cardboard(instance, &mut scene.palette, displaced::BOX_M.into(), config.seed ^ 0xb)
             });
         }
-        actors
+        actors.rigged()
     }
 
     fn add(&mut self, motion: Motion, rigid_actor: impl FnOnce(u8) -> RigidActor) {
@@ -137,33 +149,62 @@ impl Actors {
             || self.rigid_actors.iter().any(|(_, motion)| matches!(motion, Motion::Drives(_)))
     }
 
-    /// Returns the mesh and the occluders of all actors at `time` seconds, in world coordinates.
-    pub fn at(&self, time: f64, lights: &Lights) -> (Mesh, Vec<Occluder>) {
-        let (mut mesh, mut occluders) = (Mesh::default(), Vec::new());
-        let poses: Vec<BonePoses> = self.people.iter().map(|person| person.poses(time)).collect();
-        for (person, poses) in self.people.iter().zip(&poses) {
-            person.body.pose(poses, lights, &mut mesh);
-            occluders.extend(person.occluders(poses));
+    /// Returns the mesh of all actors at `time` seconds, in world coordinates, lit by `lights`.
+    pub fn at(&self, time: f64, lights: &Lights) -> Mesh {
+        self.rig.posed(&self.poses(time).bones, lights)
+    }
+
+    /// Returns the surfaces of all actors.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// Returns the poses of all actors at `time` seconds.
+    pub fn poses(&self, time: f64) -> Poses {
+        let people: Vec<BonePoses> = self.people.iter().map(|person| person.poses(time)).collect();
+        let mut occluders: Vec<Occluder> =
+            self.people.iter().zip(&people).flat_map(|(person, poses)| person.occluders(poses)).collect();
+        let mut bones = people.concat();
+        for (rigid_actor, motion) in &self.rigid_actors {
+            let Some(pose) = self.place(motion, time, &people) else { continue };
+            occluders.extend(rigid_actor.occluders(&pose));
+            bones.push(pose);
+        }
+        Poses { bones, occluders }
+    }
+
+    /// Returns the pose of a rigid actor, or `None` if nobody handles it, which no time changes.
+    fn place(&self, motion: &Motion, time: f64, people: &[BonePoses]) -> Option<Isometry3<f32>> {
+        Some(match motion {
+            Motion::Drives(route) => {
+                let step = route.at(time);
+                upright(step.position.map(|v| v as f32), 0.0, (step.heading + step.glance) as f32)
+            }
+            Motion::Handled(by) => match &self.people[*by].plan {
+                Plan::Walk(route, Task::Carry(object)) => tasks::carried(*object, route, &route.at(time), &people[*by]),
+                Plan::Walk(route, _) => tasks::chair(&route.at(time)),
+                _ => return None,
+            },
+            Motion::Displaced(displaced) => displaced.at(time),
+        })
+    }
+
+    /// Hangs the surfaces of all actors on the bones of [`Actors::poses`].
+    fn rigged(mut self) -> Self {
+        let people: Vec<BonePoses> = self.people.iter().map(|person| person.poses(0.0)).collect();
+        let (mut rig, mut bone) = (Rig::default(), 0);
+        for person in &self.people {
+            person.body.attach(&mut rig, bone);
+            bone += BONES;
         }
         for (rigid_actor, motion) in &self.rigid_actors {
-            let pose = match motion {
-                Motion::Drives(route) => {
-                    let step = route.at(time);
-                    upright(step.position.map(|v| v as f32), 0.0, (step.heading + step.glance) as f32)
-                }
-                Motion::Handled(by) => match &self.people[*by].plan {
-                    Plan::Walk(route, Task::Carry(object)) => {
-                        tasks::carried(*object, route, &route.at(time), &poses[*by])
-                    }
-                    Plan::Walk(route, _) => tasks::chair(&route.at(time)),
-                    _ => continue,
-                },
-                Motion::Displaced(displaced) => displaced.at(time),
-            };
-            rigid_actor.pose(&pose, lights, &mut mesh);
-            occluders.extend(rigid_actor.occluders(&pose));
+            if self.place(motion, 0.0, &people).is_some() {
+                rigid_actor.attach(&mut rig, bone);
+                bone += 1;
+            }
         }
-        (mesh, occluders)
+        self.rig = rig;
+        self
     }
 }
 

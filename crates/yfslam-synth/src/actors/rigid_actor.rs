@@ -8,8 +8,9 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::{Isometry3, Point3, UnitQuaternion};
 
 use super::Class;
-use crate::light::{Lights, Occluder};
+use crate::light::Occluder;
 use crate::mesh::{Lighting, Mesh, Vec3};
+use crate::rig::Rig;
 use crate::rng::Rng;
 use crate::scene::builder::{Builder, Palette, Side};
 use crate::scene::furniture;
@@ -108,13 +109,9 @@ impl RigidActor {
         Self { class, mesh, spheres }
     }
 
-    /// Appends the actor at `pose` to `out`, lit by `lights`.
-    pub fn pose(&self, pose: &Isometry3<f32>, lights: &Lights, out: &mut Mesh) {
-        out.append(&self.mesh, |_, vertex| {
-            let position = (pose * Point3::from(vertex.position)).coords;
-            let normal = pose.rotation * vertex.normal;
-            crate::mesh::Vertex { position, normal, light: lights.on_vertex(&position, &normal), ..*vertex }
-        });
+    /// Adds the surface to a rig in which it is carried by bone number `bone`.
+    pub fn attach(&self, rig: &mut Rig, bone: usize) {
+        rig.attach(&self.mesh, |_| bone);
     }
 
     /// Returns the spheres at `pose`.

@@ -31,7 +31,14 @@ pub struct SensorConfig {
     /// Time from the colour image to its depth image, s: depth shows the world this much later. 0 is a sensor that synchronises
     /// both, such as those of PrimeSense; without synchronisation they are up to half a frame apart.
     pub depth_offset_s: f64,
-    /// Exposure time of the colour camera, s: motion is blurred; 0 gives sharp images. 10 ms is the shortest time without flicker
+    /// Time from the first to the last row of the colour image, and of each image of a stereo pair, ms, -100 to 100: positive if the
+    /// top row is read first, negative if the bottom row is, 0 for a global shutter, which reads all rows at once. The stamp and the
+    /// pose of a frame are those of the instant at which the row in the middle of the image is read. The `readout_ms` of the camera
+    /// of the world is what a SLAM system is told, which may be nothing; it does not change the images.
+    pub readout_ms: f64,
+    /// The same for the depth image, about its own stamp. `None`: as for the colour image.
+    pub depth_readout_ms: Option<f64>,
+    /// Exposure time of the colour camera, s: motion is blurred, about the instant at which a row is read; 0 gives sharp images. 10 ms is the shortest time without flicker
     /// in light of 50 Hz mains.
     pub exposure_s: f64,
     /// Share of a change of brightness that automatic exposure compensates, 0 to 1; 0 keeps the gain. PrimeSense cameras have
@@ -55,6 +62,8 @@ impl Default for SensorConfig {
             max_angle_deg: 80.0,
             min_return: 0.005,
             depth_offset_s: 0.0,
+            readout_ms: 0.0,
+            depth_readout_ms: None,
             exposure_s: 0.010,
             auto_exposure: 0.8,
             min_depth_m: 0.4,
@@ -64,7 +73,7 @@ impl Default for SensorConfig {
 }
 
 impl SensorConfig {
-    /// Returns the perfect sensor: no noise, no blur, no holes, unlimited depth, rounded to the unit of the camera only.
+    /// Returns the perfect sensor: no noise, no blur, no holes, all rows at once, unlimited depth, rounded to the unit of the camera only.
     pub fn perfect() -> Self {
         Self {
             color_noise: 0.0,
@@ -76,10 +85,17 @@ impl SensorConfig {
             max_angle_deg: 90.0,
             min_return: 0.0,
             depth_offset_s: 0.0,
+            readout_ms: 0.0,
+            depth_readout_ms: None,
             exposure_s: 0.0,
             auto_exposure: 0.0,
             min_depth_m: 0.0,
             max_depth_m: f32::INFINITY,
         }
+    }
+
+    /// Returns the time from the first to the last row of the depth image, ms.
+    pub fn depth_readout(&self) -> f64 {
+        self.depth_readout_ms.unwrap_or(self.readout_ms)
     }
 }

@@ -69,6 +69,9 @@ impl WorldConfig {
         check((0.0..=90.0).contains(&s.max_angle_deg), "sensor.max_angle_deg", s.max_angle_deg, "between 0 and 90")?;
         let (offset, exposure) = (s.depth_offset_s, s.exposure_s);
         check((-1.0..=1.0).contains(&offset), "sensor.depth_offset_s", offset, "between -1 and 1 s")?;
+        for (name, ms) in [("sensor.readout_ms", s.readout_ms), ("sensor.depth_readout_ms", s.depth_readout())] {
+            check((-100.0..=100.0).contains(&ms), name, ms, "between -100 and 100 ms")?;
+        }
         check((0.0..=1.0).contains(&exposure), "sensor.exposure_s", exposure, "between 0 and 1 s")?;
         check((0.0..=1.0).contains(&s.auto_exposure), "sensor.auto_exposure", s.auto_exposure, "between 0 and 1")?;
         check(s.min_depth_m >= 0.0, "sensor.min_depth_m", s.min_depth_m, "at least 0 m")?;

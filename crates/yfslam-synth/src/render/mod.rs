@@ -1,16 +1,19 @@
 //! The renderer. In: meshes and a camera pose. Out: colour, exact depth and instance mask.
 //!
 //! A rasteriser in homogeneous coordinates over a table of viewing rays: [`project`] sets triangles up, [`raster`] finds the
-//! nearest one per pixel, [`shade`] computes the colour at a place on it, [`paint`] does so for every pixel.
+//! nearest one per pixel, [`shade`] computes the colour at a place on it, [`paint`] does so for every pixel; [`rows`] does all this
+//! for images whose rows are read at different times.
 
 pub mod paint;
 pub mod project;
 pub mod raster;
 pub mod rays;
+mod rows;
 pub mod shade;
 
 use nalgebra::Isometry3;
 use rayon::prelude::*;
+pub use rows::render_rows;
 
 use paint::Painter;
 use project::Projected;
@@ -34,7 +37,8 @@ pub struct Rendering {
 }
 
 impl Rendering {
-    fn new(pixels: usize) -> Self {
+    /// Creates an empty rendering of so many pixels.
+    pub fn new(pixels: usize) -> Self {
         Self {
             color: vec![[0.0; 3]; pixels],
             depth: vec![0.0; pixels],
@@ -42,14 +46,22 @@ impl Rendering {
             reflectance: vec![0.0; pixels],
         }
     }
+
+    /// Appends the rows below this rendering.
+    pub fn append(&mut self, below: Self) {
+        self.color.extend(below.color);
+        self.depth.extend(below.depth);
+        self.instance.extend(below.instance);
+        self.reflectance.extend(below.reflectance);
+    }
 }
 
-/// Renders the meshes of `view` from `t_cam_world`.
-pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antialias: bool) -> Rendering {
-    let triangles = project_all(rays, t_cam_world, view);
+/// Renders `view`, whose meshes are in world coordinates.
+pub fn render(rays: &RayTable, view: &View, antialias: bool) -> Rendering {
+    let triangles = project_all(rays, view);
     let mut seen = Visibility::empty(rays);
     seen.add(rays, &triangles);
-    view.prepare(&triangles, &seen.triangle);
+    view.prepare(visible(&triangles, &seen.triangle));
     let painter = Painter { rays, view, triangles: &triangles, seen: &seen, antialias };
     let bands: Vec<Rendering> = (0..rays.bands.len())
         .into_par_iter()
@@ -61,20 +73,26 @@ pub fn render(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View, antial
         })
         .collect();
     let mut rendering = Rendering::new(0);
-    for band in bands {
-        rendering.color.extend(band.color);
-        rendering.depth.extend(band.depth);
-        rendering.instance.extend(band.instance);
-        rendering.reflectance.extend(band.reflectance);
-    }
+    bands.into_iter().for_each(|band| rendering.append(band));
     rendering
 }
 
-fn project_all(rays: &RayTable, t_cam_world: &Isometry3<f64>, view: &View) -> Vec<Projected> {
+/// Returns the triangles that any pixel shows.
+fn visible<'t>(triangles: &'t [Projected], seen: &[u32]) -> impl Iterator<Item = &'t Projected> {
+    let mut visible = vec![false; triangles.len()];
+    for &id in seen {
+        if let Some(visible) = visible.get_mut(id as usize) {
+            *visible = true;
+        }
+    }
+    triangles.iter().zip(visible).filter(|(_, visible)| *visible).map(|(t, _)| t)
+}
+
+fn project_all(rays: &RayTable, view: &View) -> Vec<Projected> {
     let frustum = rays.view();
     let mut triangles = Vec::new();
     for (index, mesh) in (0u8..).zip(view.meshes) {
-        project::project(mesh, index, t_cam_world, &frustum, &mut triangles);
+        project::project(mesh, index, &view.t_cam_world, &frustum, &mut triangles);
     }
     triangles
 }

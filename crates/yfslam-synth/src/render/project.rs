@@ -28,40 +28,45 @@ pub struct Projected {
 }
 
 /// Nearest depth that is drawn, m.
-const NEAR_M: f64 = 0.05;
+pub const NEAR_M: f64 = 0.05;
 
 /// Appends the visible triangles of `mesh` (the mesh numbered `mesh_index`) to `out`.
 pub fn project(mesh: &Mesh, mesh_index: u8, t_cam_world: &Isometry3<f64>, view: &Rect, out: &mut Vec<Projected>) {
     let vertices: Vec<Vector3<f64>> =
         mesh.vertices.iter().map(|v| (t_cam_world * Point3::from(v.position.cast::<f64>())).coords).collect();
-    for (index, triangle) in mesh.triangles.iter().enumerate() {
-        let v = triangle.vertices.map(|i| vertices[i as usize]);
-        let crosses = [v[1].cross(&v[2]), v[2].cross(&v[0]), v[0].cross(&v[1])];
-        let det = v[0].dot(&crosses[0]);
-        // A triangle faces away (or is edge-on) exactly if the determinant is not negative.
-        if det >= 0.0 || v.iter().all(|p| p.z < NEAR_M) {
-            continue;
-        }
-        let bounds = bounds(&v);
-        if !bounds.overlaps(view) {
-            continue;
-        }
-        let normal = (v[1] - v[0]).cross(&(v[2] - v[0]));
-        // Edges stay unscaled: two triangles that share an edge have exactly opposite values, and no ray passes between them.
-        out.push(Projected {
-            edges: crosses.map(|c| [-c.x as f32, -c.y as f32, -c.z as f32]),
-            edge_scale: (-1.0 / det) as f32,
-            inverse_depth: (normal / det).cast::<f32>().into(),
-            bounds,
-            mesh: mesh_index,
-            triangle: index as u32,
-        });
+    for (index, triangle) in (0u32..).zip(&mesh.triangles) {
+        out.extend(project_triangle(&triangle.vertices.map(|i| vertices[i as usize]), mesh_index, index, view));
     }
 }
 
+/// Projects the triangle with corners `v` in camera coordinates, or returns `None` if it is invisible in `view`.
+pub fn project_triangle(v: &[Vector3<f64>; 3], mesh: u8, triangle: u32, view: &Rect) -> Option<Projected> {
+    let crosses = [v[1].cross(&v[2]), v[2].cross(&v[0]), v[0].cross(&v[1])];
+    let det = v[0].dot(&crosses[0]);
+    // A triangle faces away (or is edge-on) exactly if the determinant is not negative.
+    if det >= 0.0 || v.iter().all(|p| p.z < NEAR_M) {
+        return None;
+    }
+    let bounds = bounds(v);
+    if !bounds.overlaps(view) {
+        return None;
+    }
+    let normal = (v[1] - v[0]).cross(&(v[2] - v[0]));
+    // Edges stay unscaled: two triangles that share an edge have exactly opposite values, and no ray passes between them.
+    Some(Projected {
+        edges: crosses.map(|c| [-c.x as f32, -c.y as f32, -c.z as f32]),
+        edge_scale: (-1.0 / det) as f32,
+        inverse_depth: (normal / det).cast::<f32>().into(),
+        bounds,
+        mesh,
+        triangle,
+    })
+}
+
+/// Returns the range of the triangle with corners `v` in camera coordinates.
 fn bounds(v: &[Vector3<f64>; 3]) -> Rect {
     if v.iter().any(|p| p.z < NEAR_M) {
-        return Rect { x: [f32::NEG_INFINITY, f32::INFINITY], y: [f32::NEG_INFINITY, f32::INFINITY] };
+        return Rect::EVERYTHING;
     }
     let [x, y] = [v.map(|p| (p.x / p.z) as f32), v.map(|p| (p.y / p.z) as f32)];
     let range = |a: [f32; 3]| [a[0].min(a[1]).min(a[2]), a[0].max(a[1]).max(a[2])];

@@ -4,6 +4,8 @@
 //! cut into tiles; a tile keeps only triangles that can touch it, nearest first, and stops when it is covered. Bands of
 //! tiles run in parallel and write disjoint rows, so that the result does not depend on the number of threads.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::project::Projected;
@@ -15,6 +17,8 @@ pub const NOTHING: u32 = u32::MAX;
 /// Per-pixel visibility in rows of [`RayTable::stride`].
 #[derive(Clone, Debug, Default)]
 pub struct Visibility {
+    /// The row of the image that comes first.
+    pub first_row: usize,
     /// 1/z, 1/m; 0 where nothing is visible.
     pub inverse_depth: Vec<f32>,
     /// Index into the projected triangles, or [`NOTHING`].
@@ -24,10 +28,16 @@ pub struct Visibility {
 impl Visibility {
     /// Creates an empty visibility.
     pub fn empty(rays: &RayTable) -> Self {
-        Self { inverse_depth: vec![0.0; rays.x.len()], triangle: vec![NOTHING; rays.x.len()] }
+        Self::of_rows(rays, 0..rays.x.len() / rays.stride)
     }
 
-    /// Adds `triangles`; the nearest one wins in each pixel.
+    /// Creates an empty visibility of some rows.
+    pub fn of_rows(rays: &RayTable, rows: Range<usize>) -> Self {
+        let pixels = rows.len() * rays.stride;
+        Self { first_row: rows.start, inverse_depth: vec![0.0; pixels], triangle: vec![NOTHING; pixels] }
+    }
+
+    /// Adds `triangles` to a visibility of all rows; the nearest one wins in each pixel.
     pub fn add(&mut self, rays: &RayTable, triangles: &[Projected]) {
         let band = TILE * rays.stride;
         let bands = self.inverse_depth.par_chunks_mut(band).zip(self.triangle.par_chunks_mut(band));
@@ -105,9 +115,9 @@ impl Tile<'_> {
     }
 }
 
-/// Draws one row of a tile, without branches so that the compiler vectorises it.
+/// Draws triangle `id` into one row of a tile, without branches so that the compiler vectorises it.
 #[inline]
-fn draw_row(
+pub fn draw_row(
     t: &Projected,
     id: u32,
     xs: &[f32; TILE],

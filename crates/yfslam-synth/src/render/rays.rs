@@ -19,13 +19,19 @@ pub struct Rect {
 }
 
 impl Rect {
-    fn empty() -> Self {
-        Self { x: [f32::INFINITY, f32::NEG_INFINITY], y: [f32::INFINITY, f32::NEG_INFINITY] }
-    }
+    /// The range of everything.
+    pub const EVERYTHING: Self = Self { x: [f32::NEG_INFINITY, f32::INFINITY], y: [f32::NEG_INFINITY, f32::INFINITY] };
+    /// The range of nothing.
+    pub const EMPTY: Self = Self { x: [f32::INFINITY, f32::NEG_INFINITY], y: [f32::INFINITY, f32::NEG_INFINITY] };
 
     fn include(&mut self, x: f32, y: f32) {
         self.x = [self.x[0].min(x), self.x[1].max(x)];
         self.y = [self.y[0].min(y), self.y[1].max(y)];
+    }
+
+    /// Returns the rectangle with a border of the given widths in x and y.
+    pub fn grown(self, [x, y]: [f32; 2]) -> Self {
+        Self { x: [self.x[0] - x, self.x[1] + x], y: [self.y[0] - y, self.y[1] + y] }
     }
 
     /// Returns the smallest rectangle around both.
@@ -88,7 +94,7 @@ impl RayTable {
         let x: Vec<f32> = rays.iter().map(|r| r[0] as f32).collect();
         let y: Vec<f32> = rays.iter().map(|r| r[1] as f32).collect();
         let across = stride / TILE;
-        let mut tiles = vec![Rect::empty(); across * (rows / TILE)];
+        let mut tiles = vec![Rect::EMPTY; across * (rows / TILE)];
         for row in 0..rows {
             for column in 0..stride {
                 let i = row * stride + column;
@@ -98,15 +104,24 @@ impl RayTable {
         let pitch = [1.0 / camera.fx as f32, 1.0 / camera.fy as f32];
         for tile in &mut tiles {
             // Anti-aliasing samples up to half a pixel beyond the pixel centres.
-            tile.x = [tile.x[0] - pitch[0], tile.x[1] + pitch[0]];
-            tile.y = [tile.y[0] - pitch[1], tile.y[1] + pitch[1]];
+            *tile = tile.grown(pitch);
         }
-        let bands = tiles.chunks(across).map(|row| row.iter().copied().fold(Rect::empty(), Rect::union)).collect();
+        let bands = tiles.chunks(across).map(|row| row.iter().copied().fold(Rect::EMPTY, Rect::union)).collect();
         Self { width, height, stride, x, y, tiles, bands, pitch }
+    }
+
+    /// Returns the range of the part of `row` in the tile that starts at `column`.
+    pub fn chunk(&self, row: usize, column: usize) -> Rect {
+        let start = row * self.stride + column;
+        let mut rect = Rect::EMPTY;
+        for (x, y) in self.x[start..start + TILE].iter().zip(&self.y[start..start + TILE]) {
+            rect.include(*x, *y);
+        }
+        rect.grown(self.pitch)
     }
 
     /// Returns the range of the whole image.
     pub fn view(&self) -> Rect {
-        self.bands.iter().copied().fold(Rect::empty(), Rect::union)
+        self.bands.iter().copied().fold(Rect::EMPTY, Rect::union)
     }
 }

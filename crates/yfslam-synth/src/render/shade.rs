@@ -4,28 +4,46 @@
 //! the image (Olano and Greer 1997, section 3.2), and so the size of a pixel on the texture, which selects the mip level (Williams,
 //! "Pyramidal parametrics", SIGGRAPH 1983), follows in closed form.
 
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+
 use super::project::Projected;
 use crate::bake::LightMap;
-use crate::light::Occluder;
-use crate::mesh::{Lighting, Mesh, Vec3};
+use crate::light::{Lights, Occluder};
+use crate::mesh::{Lighting, Mesh, Vec3, Vertex};
+use crate::rig::Rig;
 use crate::surfaces::Surfaces;
 use crate::texture::Texture;
 
 /// The input of shading.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
-    /// Meshes by [`Projected::mesh`].
+    /// Meshes by [`Projected::mesh`]: the static one and that of the actors.
     pub meshes: [&'a Mesh; 2],
+    /// The bones and the light of the actors, if their mesh is in the coordinates of bones.
+    pub carried: Option<Carried<'a>>,
     /// Textures and light maps.
     pub surfaces: &'a Surfaces,
     /// Brightness of flickering lamps.
     pub brightness: f32,
     /// Bodies that darken their surroundings; positions in camera coordinates.
     pub occluders: &'a [Occluder],
-    /// Rotation from world to camera.
-    pub r_cam_world: nalgebra::UnitQuaternion<f32>,
+    /// Pose of the world in the camera.
+    pub t_cam_world: Isometry3<f64>,
+    /// Its rotation.
+    pub r_cam_world: UnitQuaternion<f32>,
     /// Size of a pixel in normalised coordinates.
     pub pitch: [f32; 2],
+}
+
+/// What places the mesh of the actors at the time of a view.
+#[derive(Clone, Copy)]
+pub struct Carried<'a> {
+    /// The mesh with the bones of its vertices.
+    pub rig: &'a Rig,
+    /// Poses of the bones.
+    pub bones: &'a [Isometry3<f32>],
+    /// Light at that time.
+    pub lights: &'a Lights,
 }
 
 type Plane = [f32; 3];
@@ -61,21 +79,32 @@ fn at(plane: &Plane, x: f32, y: f32) -> f32 {
 }
 
 impl<'a> View<'a> {
+    /// Returns vertex `index` of the mesh numbered `mesh` in camera coordinates, m.
+    pub fn in_camera(&self, mesh: u8, index: u32) -> Vector3<f64> {
+        let position = match &self.carried {
+            Some(carried) if mesh == 1 => carried.rig.position(carried.bones, index),
+            _ => self.meshes[usize::from(mesh)].vertices[index as usize].position,
+        };
+        (self.t_cam_world * Point3::from(position.cast::<f64>())).coords
+    }
+
+    /// Returns vertex `index` of the mesh numbered `mesh` in world coordinates.
+    fn vertex(&self, mesh: u8, index: u32) -> Vertex {
+        match &self.carried {
+            Some(carried) if mesh == 1 => carried.rig.vertex(carried.bones, carried.lights, index),
+            _ => self.meshes[usize::from(mesh)].vertices[index as usize],
+        }
+    }
+
     /// Returns the instance (0 static, k actor) of a projected triangle.
     pub fn instance(&self, t: &Projected) -> u8 {
         let mesh = self.meshes[usize::from(t.mesh)];
         mesh.patches[mesh.triangles[t.triangle as usize].patch as usize].instance
     }
 
-    /// Computes the textures and light maps of all visible surfaces.
-    pub fn prepare(&self, triangles: &[Projected], seen: &[u32]) {
-        let mut visible = vec![false; triangles.len()];
-        for &id in seen {
-            if let Some(visible) = visible.get_mut(id as usize) {
-                *visible = true;
-            }
-        }
-        let patches = triangles.iter().zip(visible).filter(|(_, visible)| *visible).map(|(t, _)| {
+    /// Computes the textures and light maps of the visible surfaces.
+    pub fn prepare<'t>(&self, visible: impl Iterator<Item = &'t Projected>) {
+        let patches = visible.map(|t| {
             let mesh = self.meshes[usize::from(t.mesh)];
             (mesh, mesh.triangles[t.triangle as usize].patch)
         });
@@ -92,7 +121,7 @@ impl<'a> View<'a> {
         let mesh = self.meshes[usize::from(t.mesh)];
         let triangle = mesh.triangles[t.triangle as usize];
         let patch = mesh.patches[triangle.patch as usize];
-        let v = triangle.vertices.map(|i| mesh.vertices[i as usize]);
+        let v = triangle.vertices.map(|i| self.vertex(t.mesh, i));
         let scaled = t.edges.map(|e| e.map(|c| c * t.edge_scale));
         let plane = |a: [f32; 3]| -> Plane {
             std::array::from_fn(|k| a[0] * scaled[0][k] + a[1] * scaled[1][k] + a[2] * scaled[2][k])

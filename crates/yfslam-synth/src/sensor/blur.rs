@@ -11,6 +11,8 @@ use crate::render::rays::RayTable;
 
 /// Paths shorter than this are not blurred, px.
 const LEAST_PX: f32 = 0.3;
+/// Keeps paths finite where a point moves down the image as fast as the shutter.
+const LEAST_STRETCH: f32 = 0.1;
 /// Largest number of samples along a path.
 const MOST_SAMPLES: f32 = 16.0;
 
@@ -21,13 +23,20 @@ pub struct CameraMove {
     translation: Vector3<f32>,
     /// Rotation, rad.
     rotation: Vector3<f32>,
+    /// Time from one row to the next over the time of the exposure.
+    line: f32,
 }
 
 impl CameraMove {
     /// Computes the motion from the poses (world from camera) at the opening and closing of the shutter.
     pub fn between(open: &Isometry3<f64>, close: &Isometry3<f64>) -> Self {
         let moved = open.inverse() * close;
-        Self { translation: moved.translation.vector.cast(), rotation: moved.rotation.scaled_axis().cast() }
+        Self { translation: moved.translation.vector.cast(), rotation: moved.rotation.scaled_axis().cast(), line: 0.0 }
+    }
+
+    /// Sets the time from one row to the next, in exposures; 0 for a global shutter.
+    pub fn with_line(self, exposures: f64) -> Self {
+        Self { line: exposures as f32, ..self }
     }
 
     /// Returns the path of the image of the point at depth `z` on the ray (x, y, 1), in normalised coordinates.
@@ -38,11 +47,18 @@ impl CameraMove {
     }
 }
 
-/// Blurs `color` (row-major, like the rays) along the paths of its points; pixels without depth stay.
-pub fn smear(color: &[[f32; 3]], depth: &[f32], rays: &RayTable, motion: &CameraMove) -> Vec<[f32; 3]> {
+/// Blurs `color` (row-major, like the rays) along the paths of its points, where `motion` is the motion of the camera about the time
+/// of a row; pixels without depth stay.
+pub fn smear(
+    color: &[[f32; 3]],
+    depth: &[f32],
+    rays: &RayTable,
+    motion: impl Fn(usize) -> CameraMove + Sync,
+) -> Vec<[f32; 3]> {
     let width = rays.width;
     let mut out = color.to_vec();
     out.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
+        let motion = motion(row);
         for (column, pixel) in line.iter_mut().enumerate() {
             let (z, ray) = (depth[row * width + column], row * rays.stride + column);
             if z <= 0.0 {
@@ -50,6 +66,10 @@ pub fn smear(color: &[[f32; 3]], depth: &[f32], rays: &RayTable, motion: &Camera
             }
             let [dx, dy] = motion.path(rays.x[ray], rays.y[ray], z);
             let (dx, dy) = (dx / rays.pitch[0], dy / rays.pitch[1]);
+            // The samples of a rolling image are later the lower they lie, and their points have moved on: one that moves by s (dx,
+            // dy) while the shutter is open is found where s (dx, dy) / (1 - dy · line) is.
+            let stretch = 1.0 / (1.0 - dy * motion.line).max(LEAST_STRETCH);
+            let (dx, dy) = (dx * stretch, dy * stretch);
             let length = dx.hypot(dy);
             if length > LEAST_PX {
                 *pixel = mean_along(color, width, [column as f32, row as f32], [dx, dy], length);
@@ -95,7 +115,7 @@ mod tests {
         let mut color = vec![[0.0; 3]; 64 * 48];
         color[24 * 64 + 32] = [1.0; 3];
         let moved = CameraMove::between(&Isometry3::identity(), &motion);
-        let out = smear(&color, &vec![2.0; 64 * 48], &RayTable::new(&camera), &moved);
+        let out = smear(&color, &vec![2.0; 64 * 48], &RayTable::new(&camera), |_| moved);
         let lit = |x: usize, y: usize| out[y * 64 + x][0] > 0.05;
         let columns = (0..64).filter(|&x| (0..48).any(|y| lit(x, y))).count();
         let rows = (0..48).filter(|&y| (0..64).any(|x| lit(x, y))).count();
@@ -110,5 +130,23 @@ mod tests {
         assert!((7..=9).contains(&columns) && rows == 1 && (light - 1.0).abs() < 0.02, "{columns} {rows} {light}");
         let (columns, rows, _) = smeared_dot(Isometry3::rotation(Vector3::new(0.008, 0.0, 0.0)));
         assert!(columns == 1 && (4..=6).contains(&rows), "{columns} {rows}");
+    }
+
+    #[test]
+    fn rows_of_a_rolling_image_are_blurred_as_if_the_whole_image_had_been_taken_at_their_time() {
+        let Camera { fx, fy, .. } = default_camera();
+        let camera = Camera::pinhole(64, 48, fx, fy, 32.0, 24.0);
+        for (pitch, line) in [(0.008, 0.0), (0.008, 0.05), (-0.008, 0.05), (0.008, -0.05)] {
+            let motion = Isometry3::rotation(Vector3::new(pitch, 0.0, 0.0));
+            let moved = CameraMove::between(&Isometry3::identity(), &motion).with_line(line);
+            // A pattern y² that moves down by `dy` per exposure appears stretched in a rolling image.
+            let dy = pitch * fy;
+            let shown = |row: usize| ((row as f64 - 24.0) * (1.0 - dy * line)).powi(2) as f32;
+            let color: Vec<[f32; 3]> = (0..64 * 48).map(|i| [shown(i / 64); 3]).collect();
+            let out = smear(&color, &vec![2.0; 64 * 48], &RayTable::new(&camera), |_| moved);
+            // The mean of a square over a path is more than the square in its middle by a twelfth of the squared length.
+            let more = f64::from(out[24 * 64 + 32][0] - color[24 * 64 + 32][0]) / (dy * dy / 12.0);
+            assert!((more - 1.0).abs() < 0.15, "{pitch} {line}: {more}");
+        }
     }
 }

@@ -5,3 +5,4 @@ pub mod blur;
 pub mod color;
 pub mod depth;
 pub mod exposure;
+pub mod shutter;

@@ -19,7 +19,7 @@ impl World {
         // Light does not matter for the share.
         let dark = Lights::default();
         let share = |actors: &Actors| {
-            let shares = times.par_iter().zip(&backdrops).map(|(&t, b)| b.share(&rays, &actors.at(t, &dark).0));
+            let shares = times.par_iter().zip(&backdrops).map(|(&t, b)| b.share(&rays, &actors.at(t, &dark)));
             // Summed in order: a parallel sum would depend on the threads.
             shares.collect::<Vec<f64>>().iter().sum::<f64>() / count as f64
         };

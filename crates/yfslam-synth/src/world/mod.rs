@@ -4,26 +4,22 @@
 //! and any machine of one kind give the same bits.
 
 mod distance;
+mod shoot;
 
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use yfslam::{BoundingBox, Camera, DepthImage, Detection, Frame, Image, RgbImage};
+use yfslam::{BoundingBox, Camera, Detection, Frame, Image, RgbImage};
 
 use crate::actors::Actors;
 use crate::bake::Baker;
 use crate::camera_path::CameraPath;
 use crate::config::{WorldConfig, WorldError, default_camera};
-use crate::flicker;
-use crate::light::Occluder;
 use crate::render::rays::RayTable;
-use crate::render::shade::View;
-use crate::render::{self, Rendering};
 use crate::rng::hash;
 use crate::scene::Scene;
-use crate::sensor;
-use crate::sensor::blur::CameraMove;
 use crate::sensor::exposure::Meter;
+use crate::sensor::shutter::Shutter;
 use crate::surfaces::Surfaces;
 
 /// Width of the small renderings from which shares and brightness are estimated, px.
@@ -51,14 +47,16 @@ pub struct SynthFrame {
     pub frame: Frame,
     /// Time of the depth image, ns: that of the colour image plus [`SensorConfig::depth_offset_s`](crate::SensorConfig).
     pub depth_timestamp_ns: i64,
-    /// Exact pose at the time of the colour image: world from camera.
+    /// Exact pose at the time of the colour image, which is that of its middle row: world from camera. [`World::row_pose`] is that
+    /// of any row.
     pub t_world_cam: Isometry3<f64>,
-    /// 0 for the static world, k for actor k (from 1).
+    /// What the colour image shows: 0 for the static world, k for actor k (from 1). Each row is that of its own time.
     pub instances: Image<u8>,
-    /// Exact depth along the optical axis, m; 0 where nothing is visible.
+    /// Exact depth along the optical axis of what the colour image shows, m; 0 where nothing is visible. Each row is that of its
+    /// own time.
     pub exact_depth: Image<f32>,
     /// Exact boxes of the sufficiently visible actors, in the order of their numbers: number, class (an index into
-    /// [`CLASS_NAMES`](crate::CLASS_NAMES)), tight bounds of the visible pixels.
+    /// [`CLASS_NAMES`](crate::CLASS_NAMES)), tight bounds of the pixels in `instances`.
     pub boxes: Vec<(u8, usize, BoundingBox)>,
 }
 
@@ -117,26 +115,40 @@ impl World {
         self.path.pose(self.seconds(index))
     }
 
+    /// Returns the exact pose (world from camera) at which `row` of the colour image of frame `index` is read; rows may lie between
+    /// pixels. That of every row is [`World::pose`] unless the shutter is a rolling one.
+    pub fn row_pose(&self, index: usize, row: f64) -> Isometry3<f64> {
+        self.path.pose(self.color_shutter(index).time(row, self.rays.height))
+    }
+
+    /// Returns the exact pose (world from camera) at which `row` of the depth image of frame `index` is read.
+    pub fn depth_row_pose(&self, index: usize, row: f64) -> Isometry3<f64> {
+        self.path.pose(self.depth_shutter(index).time(row, self.rays.height))
+    }
+
     /// Renders frame `index`; numbers past the end continue the motion.
     pub fn frame(&self, index: usize) -> SynthFrame {
-        let (time, t_world_cam) = (self.seconds(index), self.pose(index));
-        let rendering = self.render(&self.rays, time, &t_world_cam);
+        let (time, shutter) = (self.seconds(index), self.color_shutter(index));
+        let at_camera = Isometry3::identity();
+        let rendering = self.shoot(&self.rays, &shutter, &at_camera);
         let noise = hash(self.config.seed, 0x4015_e000 + index as u64);
-        let color = self.expose(&self.rays, &rendering, time, &Isometry3::identity(), hash(noise, 0));
+        let color = self.expose(&self.rays, &rendering, &shutter, &at_camera, hash(noise, 0));
         let mount = Isometry3::translation(self.config.stereo_m, 0.0, 0.0);
         let right = (self.config.stereo_m > 0.0).then(|| self.second(&self.rays, index, &mount));
-        let depth = right.is_none().then(|| Arc::new(self.measure(&rendering, time, hash(noise, 1))));
+        let depth = right.is_none().then(|| Arc::new(self.measure(&rendering, index, hash(noise, 1))));
         let (width, height) = (self.rays.width, self.rays.height);
         let boxes = self.boxes(&rendering.instance);
         let detections = self.config.detections.then(|| {
             boxes.iter().map(|&(_, class, bbox)| Detection { class, score: 1.0, bbox }).collect::<Vec<Detection>>()
         });
         let mut frame = Frame::mono(to_ns(time), color);
+        let depth_timestamp_ns = to_ns(self.depth_shutter(index).middle_s);
+        frame.depth_timestamp_ns = depth.is_some().then_some(depth_timestamp_ns);
         (frame.depth, frame.right, frame.detections) = (depth, right.map(Arc::new), detections);
         SynthFrame {
-            depth_timestamp_ns: to_ns(time + self.config.sensor.depth_offset_s),
+            depth_timestamp_ns,
             frame,
-            t_world_cam,
+            t_world_cam: self.pose(index),
             instances: image(width, height, rendering.instance),
             exact_depth: image(width, height, rendering.depth),
             boxes,
@@ -144,74 +156,28 @@ impl World {
     }
 
     /// Renders the image of a second camera, fixed to the first, at the time of frame `index`: `mount` is its pose in the frame of
-    /// the first camera, `camera` its calibration with distortion.
+    /// the first camera, `camera` its calibration with distortion. Its shutter has the readout of the first, over its own rows.
     pub fn second_view(&self, index: usize, camera: &Camera, mount: &Isometry3<f64>) -> RgbImage {
         self.second(&RayTable::new(camera), index, mount)
     }
 
     fn second(&self, rays: &RayTable, index: usize, mount: &Isometry3<f64>) -> RgbImage {
-        let time = self.seconds(index);
-        let rendering = self.render(rays, time, &(self.pose(index) * mount));
-        self.expose(rays, &rendering, time, mount, hash(hash(self.config.seed, 0x4015_e000 + index as u64), 2))
+        let shutter = self.color_shutter(index);
+        let rendering = self.shoot(rays, &shutter, mount);
+        self.expose(rays, &rendering, &shutter, mount, hash(hash(self.config.seed, 0x4015_e000 + index as u64), 2))
     }
 
     fn seconds(&self, index: usize) -> f64 {
         index as f64 / self.config.camera.fps
     }
 
-    fn render(&self, rays: &RayTable, time: f64, t_world_cam: &Isometry3<f64>) -> Rendering {
-        let brightness = flicker::brightness(self.config.light.flicker, self.config.seed, time);
-        let (actors, occluders) = self.actors.at(time, &self.scene.lights.dimmed(brightness));
-        let t_cam_world = t_world_cam.inverse();
-        let nearby =
-            if self.config.light.moving_shadows { self.in_camera(&occluders, &t_cam_world) } else { Vec::new() };
-        let view = View {
-            meshes: [&self.scene.mesh, &actors],
-            surfaces: &self.surfaces,
-            brightness,
-            occluders: &nearby,
-            r_cam_world: t_cam_world.rotation.cast(),
-            pitch: rays.pitch,
-        };
-        render::render(rays, &t_cam_world, &view, self.config.antialias)
+    fn color_shutter(&self, index: usize) -> Shutter {
+        Shutter { middle_s: self.seconds(index), readout_s: 1e-3 * self.config.sensor.readout_ms }
     }
 
-    /// Computes the colour image of a camera mounted at `mount` on the first, which sets the exposure of both: blur, gain,
-    /// development.
-    fn expose(&self, rays: &RayTable, rendering: &Rendering, time: f64, mount: &Isometry3<f64>, seed: u64) -> RgbImage {
-        let (sensor, (width, height)) = (&self.config.sensor, (rays.width, rays.height));
-        let gain = self.config.light.exposure * self.meter.gain(time, |at| self.brightness(at));
-        let smeared = (sensor.exposure_s > 0.0).then(|| {
-            let [open, close] = [-0.5, 0.5].map(|part| self.path.pose(time + part * sensor.exposure_s) * mount);
-            sensor::blur::smear(&rendering.color, &rendering.depth, rays, &CameraMove::between(&open, &close))
-        });
-        let linear = smeared.as_ref().unwrap_or(&rendering.color);
-        sensor::color::develop(linear, width, height, gain, sensor.color_noise, seed)
-    }
-
-    /// Computes the depth image, which may show the world slightly later than the colour image.
-    fn measure(&self, rendering: &Rendering, time: f64, seed: u64) -> DepthImage {
-        let (camera, sensor) = (&self.config.camera, &self.config.sensor);
-        let later = (sensor.depth_offset_s != 0.0).then(|| {
-            let time = time + sensor.depth_offset_s;
-            self.render(&self.rays, time, &self.path.pose(time))
-        });
-        let rendering = later.as_ref().unwrap_or(rendering);
-        sensor::depth::measure(rendering, &self.rays, camera, self.config.depth_factor, sensor, seed)
-    }
-
-    /// Returns the mean brightness of the image, as measured by automatic exposure.
-    fn brightness(&self, time: f64) -> f32 {
-        let rendering = self.render(&self.small_rays, time, &self.path.pose(time));
-        // White is clipped: a lamp in the image does not count for more.
-        let sum: f32 = rendering.color.iter().map(|rgb| rgb.iter().map(|v| v.min(1.0)).sum::<f32>() / 3.0).sum();
-        sum / rendering.color.len().max(1) as f32
-    }
-
-    fn in_camera(&self, occluders: &[Occluder], t_cam_world: &Isometry3<f64>) -> Vec<Occluder> {
-        let pose: Isometry3<f32> = t_cam_world.cast();
-        let moved = |o: &Occluder| (pose * nalgebra::Point3::from(o.center)).coords;
-        occluders.iter().map(|o| Occluder { center: moved(o), ..*o }).collect()
+    fn depth_shutter(&self, index: usize) -> Shutter {
+        let sensor = &self.config.sensor;
+        Shutter { middle_s: self.seconds(index) + sensor.depth_offset_s, readout_s: 1e-3 * sensor.depth_readout() }
     }
 
     /// Returns the boxes around the visible pixels of all actors with enough of them.

@@ -14,7 +14,7 @@ fn masks_within_outlines(spec: &str, frames: impl Iterator<Item = usize>, classe
     let mut seen = [0; 8];
     for index in frames {
         let shot = world.frame(index);
-        let (mesh, _) = world.actors.at(world.seconds(index), &Lights::default());
+        let mesh = world.actors.at(world.seconds(index), &Lights::default());
         let mut outlines = [[f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY]; 8];
         for triangle in &mesh.triangles {
             let instance = usize::from(mesh.patches[triangle.patch as usize].instance);
@@ -69,7 +69,7 @@ fn distance(p: &Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
 /// Returns the distance of the camera from the nearest surface of any actor at `time`.
 fn clearance(world: &World, time: f64) -> f32 {
     let camera: Vec3 = world.path.pose(time).translation.vector.cast();
-    let (mesh, _) = world.actors.at(time, &Lights::default());
+    let mesh = world.actors.at(time, &Lights::default());
     let corners = |triangle: &Triangle| triangle.vertices.map(|k| mesh.vertices[k as usize].position);
     mesh.triangles.iter().map(|t| distance(&camera, corners(t))).fold(f32::INFINITY, f32::min)
 }

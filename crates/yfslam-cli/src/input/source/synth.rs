@@ -65,7 +65,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let renderer = Renderer::start(world, part.clone(), classes)?;
     Ok(Source {
         name: name.into(),
-        camera: world_camera(&config),
+        camera: part.camera(&config),
         mirror: part.mirror,
         depth_source,
         frames: Frames::new(Player::Synth(renderer), depth_source, args, &stamps_ns),
@@ -101,8 +101,24 @@ impl Part {
     }
 
     fn stamp_ns(&self, world: &World, index: usize) -> i64 {
-        let stamp_ns = world.timestamp_ns(index);
+        self.played_ns(world.timestamp_ns(index))
+    }
+
+    /// Returns the time at which what happens in the world at `stamp_ns` is played.
+    fn played_ns(&self, stamp_ns: i64) -> i64 {
         self.mirror.map_or(stamp_ns, |mirror| mirror.apply(stamp_ns))
+    }
+
+    /// Returns the camera as it is when time runs as it is played: backward, the row that was read last comes first.
+    fn camera(&self, config: &WorldConfig) -> CameraSource {
+        let mut source = world_camera(config);
+        if self.mirror.is_some() {
+            let camera = &mut source.camera;
+            for ms in [&mut camera.readout_ms, &mut camera.depth_readout_ms, &mut camera.depth_delay_ms] {
+                *ms = ms.map(|ms| 0.0 - ms);
+            }
+        }
+        source
     }
 }
 
@@ -116,7 +132,8 @@ impl Renderer {
                 let started = Instant::now();
                 let mut frame = rendered.frame(index).frame;
                 frame.detections.iter_mut().for_each(|boxes| boxes.retain(|b| classes.contains(&b.class)));
-                frame.timestamp_ns = played.stamp_ns(&rendered, index);
+                frame.timestamp_ns = played.played_ns(frame.timestamp_ns);
+                frame.depth_timestamp_ns = frame.depth_timestamp_ns.map(|stamp_ns| played.played_ns(stamp_ns));
                 // The receiver is gone because the run has ended.
                 if sender.send((frame, started.elapsed())).is_err() {
                     return;

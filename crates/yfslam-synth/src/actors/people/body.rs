@@ -2,14 +2,15 @@
 //!
 //! In: proportions, colours and a seed. Out: a mesh in bone coordinates with the bone of every vertex.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 
 use rayon::prelude::*;
 
-use super::skeleton::{self, BONES, Bone, BonePoses, Proportions};
+use super::skeleton::{self, BONES, Bone, Proportions};
 use crate::bvh::Bvh;
 use crate::light::{Lights, hemisphere, scattered};
 use crate::mesh::{Lighting, Mesh, Patch, Vec3, Vertex};
+use crate::rig::Rig;
 use crate::rng::Rng;
 use crate::scene::builder::Palette;
 use crate::texture::material::{Material, Pattern, blend, tint};
@@ -66,8 +67,9 @@ impl Body {
     fn shade_itself(&mut self) {
         let joints = super::gait::stand(0, 0.0);
         let poses = skeleton::forward_kinematics(&Isometry3::identity(), &self.proportions, &joints);
-        let mut posed = Mesh::default();
-        self.pose(&poses, &Lights::default(), &mut posed);
+        let mut rig = Rig::default();
+        self.attach(&mut rig, 0);
+        let posed = rig.posed(&poses, &Lights::default());
         let limb_of = |vertex: u32| LIMBS[usize::from(self.bones[vertex as usize])];
         let others: Vec<Bvh> = (0..LIMB_COUNT)
             .into_par_iter()
@@ -89,15 +91,9 @@ impl Body {
         }
     }
 
-    /// Appends the body in the given pose to `out`, lit by `lights`.
-    pub fn pose(&self, poses: &BonePoses, lights: &Lights, out: &mut Mesh) {
-        out.append(&self.mesh, |index, vertex| {
-            let pose: &Isometry3<f32> = &poses[usize::from(self.bones[index])];
-            let position = (pose * Point3::from(vertex.position)).coords;
-            let normal = pose.rotation * vertex.normal;
-            let light = lights.on_vertex(&position, &normal);
-            Vertex { position, normal, light: light.map(|l| l * vertex.light[0]), ..*vertex }
-        });
+    /// Adds the surface to a rig whose bones from number `first_bone` on are those of this body.
+    pub fn attach(&self, rig: &mut Rig, first_bone: usize) {
+        rig.attach(&self.mesh, |vertex| first_bone + usize::from(self.bones[vertex]));
     }
 }
 
