@@ -244,7 +244,9 @@ mod tests {
         let unknown = "walking_xyz?unknown_readout=true&readout=30";
         assert_eq!(told(unknown), ((30.0, 30.0), (None, None, None)));
         assert_eq!(told("walking_xyz?readout=30&stereo=0.11"), ((30.0, 30.0), (Some(30.0), None, None)));
-        let rolling = parse_with_camera("walking_xyz", default_camera().with_readout_ms(25.0), 5000.0).unwrap();
+        let mut camera = default_camera();
+        camera.readout_ms = Some(25.0);
+        let rolling = parse_with_camera("walking_xyz", camera, 5000.0).unwrap();
         assert_eq!((rolling.sensor.readout_ms, rolling.camera.readout_ms), (25.0, Some(25.0)));
         assert!(message("walking_xyz?readout=101").contains("between -100 and 100 ms"));
         assert!(message("walking_xyz?depth_readout=-101").contains("between -100 and 100 ms"));

@@ -97,13 +97,6 @@ impl Camera {
         self
     }
 
-    /// Sets the time from the first to the last row of an image, ms; 0 for a global shutter.
-    #[must_use]
-    pub fn with_readout_ms(mut self, readout_ms: f64) -> Self {
-        self.readout_ms = Some(readout_ms);
-        self
-    }
-
     /// Distorts normalised image coordinates (x = X/Z, y = Y/Z) and returns the pixel position.
     pub fn distort(&self, x: f64, y: f64) -> [f64; 2] {
         let [k1, k2, p1, p2, k3] = self.distortion;

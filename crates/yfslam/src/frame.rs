@@ -44,13 +44,6 @@ impl Frame {
         Self { timestamp_ns, color, depth: None, depth_timestamp_ns: None, right: None, detections: None, mask: None }
     }
 
-    /// Sets the time of the depth image, where its sensor is not triggered together with the colour sensor.
-    #[must_use]
-    pub fn with_depth_timestamp(mut self, timestamp_ns: i64) -> Self {
-        self.depth_timestamp_ns = Some(timestamp_ns);
-        self
-    }
-
     /// Adds detections of movable objects from another source.
     #[must_use]
     pub fn with_detections(mut self, detections: Vec<Detection>) -> Self {

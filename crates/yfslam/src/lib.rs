@@ -116,6 +116,8 @@ pub use loops::LoopClosure;
 #[cfg(feature = "persist")]
 pub use map::MapError;
 pub use map::{KeyFrame, KeyFrameId, KeyframeRelativePose, Landmark, LandmarkId, Map};
-pub use system::{FrameRejected, MapUse, SavedMap, SetupError, Slam, SlamBuilder, StageTimes, Statistics, Tracked};
+pub use system::{
+    FrameRejected, MapUse, Readout, SavedMap, SetupError, Slam, SlamBuilder, StageTimes, Statistics, Tracked,
+};
 pub use tracking::{LostReason, TrackingState};
 pub use worker::Execution;

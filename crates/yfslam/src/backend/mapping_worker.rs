@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::{Backend, Inserted};
-use crate::features::rolling_shutter::Velocity;
+use crate::features::rolling_shutter::{FrameTimes, Velocity};
 use crate::image::RgbImage;
 use crate::loops::{GlobalBundle, PlaceRecogniser};
 use crate::map::{KeyFrameId, Map};
@@ -30,6 +30,8 @@ enum Request {
     Count(ObservationCounts),
     /// Velocity of the frame of that time.
     Retime(i64, Velocity),
+    /// How the rows of all images are read.
+    SetRowTimes(FrameTimes),
     /// The adjustment of that number has finished, or has ended by a panic.
     Adjusted(u64, Option<Box<GlobalBundle>>),
     RemoveSubmap(KeyFrameId),
@@ -155,6 +157,10 @@ impl MappingWorker {
         self.send(Request::Retime(timestamp_ns, *velocity));
     }
 
+    pub(super) fn set_row_times(&mut self, times: &FrameTimes) {
+        self.send(Request::SetRowTimes(*times));
+    }
+
     pub(super) fn remove_submap(&mut self, root: KeyFrameId) {
         self.send(Request::RemoveSubmap(root));
     }
@@ -221,6 +227,10 @@ impl Mapping {
             Request::Retime(timestamp_ns, velocity) => {
                 self.backend.retime(timestamp_ns, &velocity);
                 return None;
+            }
+            Request::SetRowTimes(times) => {
+                self.backend.set_row_times(&times);
+                None
             }
             Request::RemoveSubmap(root) => {
                 self.backend.map.remove_submap(root);

@@ -10,11 +10,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::context::Context;
-use crate::features::rolling_shutter::Velocity;
+use crate::features::rolling_shutter::{FrameTimes, Velocity};
 use crate::image::RgbImage;
 use crate::loops::{GlobalBundle, LoopCloser, LoopClosure, PlaceRecogniser};
 use crate::map::{KeyFrameId, Map};
-use crate::mapping::{Mapper, retime};
+use crate::mapping::{Mapper, retime, retime_all};
 use crate::tracking::{ObservationCounts, TrackedFrame, TwoViewMap};
 use crate::worker::Execution;
 use mapping_worker::MappingWorker;
@@ -90,6 +90,14 @@ impl Backend {
             && self.map.keyframe(latest).is_some_and(|k| k.timestamp_ns == timestamp_ns)
         {
             retime(&self.context, &mut self.map, latest, velocity);
+        }
+    }
+
+    /// Corrects all keyframes once it is known how the rows of their images are read.
+    fn set_row_times(&mut self, times: &FrameTimes) {
+        retime_all(&self.context, &mut self.map, times);
+        if let Some(latest) = self.latest {
+            self.adjust_submap(latest);
         }
     }
 
@@ -196,6 +204,14 @@ impl MapOwner {
         match self {
             Self::Inline(backend) => backend.retime(timestamp_ns, velocity),
             Self::Threaded(worker) => worker.retime(timestamp_ns, velocity),
+        }
+    }
+
+    /// Corrects all keyframes once it is known how the rows of their images are read.
+    pub(crate) fn set_row_times(&mut self, times: &FrameTimes) {
+        match self {
+            Self::Inline(backend) => backend.set_row_times(times),
+            Self::Threaded(worker) => worker.set_row_times(times),
         }
     }
 

@@ -31,7 +31,7 @@ pub use method::{Grouping, Method};
 pub use monocular::MonocularConfig;
 pub use optimize::{BundleConfig, PoseGraphConfig, PoseOptimizerConfig};
 pub use places::{LoopConfig, PlaceConfig};
-pub use tracking::TrackingConfig;
+pub use tracking::{ReadoutEstimation, TrackingConfig};
 pub use validate::ConfigError;
 
 use section::{Check, Key, Section, config_section};

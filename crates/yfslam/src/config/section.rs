@@ -123,7 +123,7 @@ macro_rules! other_entries {
 }
 
 number_entries!(u8 => Integer, u32 => Integer, u64 => Integer, usize => Integer, f32 => Single, f64 => Double);
-other_entries!(bool, Vec<String>, super::Method, super::Grouping, super::DepthSource);
+other_entries!(bool, Vec<String>, super::Method, super::Grouping, super::DepthSource, super::ReadoutEstimation);
 
 /// Returns the full name of a key.
 pub(crate) fn joined(prefix: &str, name: &str) -> String {

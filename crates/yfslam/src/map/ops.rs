@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use slotmap::SecondaryMap;
 
 use crate::features::FrameFeatures;
-use crate::features::rolling_shutter::Velocity;
+use crate::features::rolling_shutter::{FrameTimes, Velocity};
 use crate::geometry::{Pinhole, Pose, Similarity, rigid};
 use crate::map::{KeyFrame, KeyFrameId, Landmark, LandmarkId, Map};
 
@@ -165,6 +165,13 @@ impl Map {
     pub(crate) fn set_position(&mut self, landmark: LandmarkId, position: Point3<f64>) {
         if let Some(l) = self.landmarks.get_mut(landmark) {
             l.position = position;
+        }
+    }
+
+    /// Sets how the rows of the images of a keyframe were read.
+    pub(crate) fn set_row_times(&mut self, keyframe: KeyFrameId, times: &FrameTimes) {
+        if let Some(k) = self.keyframes.get_mut(keyframe) {
+            k.features.set_row_times(times);
         }
     }
 

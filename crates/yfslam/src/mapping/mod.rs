@@ -14,7 +14,7 @@ use crate::context::{Context, SensorModel};
 use crate::image::RgbImage;
 use crate::map::{KeyFrameId, LandmarkId, Map};
 use crate::tracking::{StartFrame, TrackedFrame, TwoViewMap};
-pub(crate) use retime::retime;
+pub(crate) use retime::{retime, retime_all};
 pub(crate) use window::Window;
 
 /// Local mapping.

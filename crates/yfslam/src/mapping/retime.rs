@@ -6,9 +6,20 @@
 use nalgebra::Point3;
 
 use crate::context::Context;
-use crate::features::rolling_shutter::Velocity;
+use crate::features::rolling_shutter::{FrameTimes, Velocity};
 use crate::map::{KeyFrameId, Map};
 use crate::optimize::pose_only::{PoseObservation, optimize_pose};
+
+/// Corrects all keyframes that still have their features as measured, once it is known how the rows of the images are read.
+pub(crate) fn retime_all(context: &Context, map: &mut Map, times: &FrameTimes) {
+    let known = map.keyframes().filter_map(|(id, k)| Some((k.sequence, id, *k.features.velocity()?)));
+    let mut known: Vec<(u64, KeyFrameId, Velocity)> = known.collect();
+    known.sort_unstable_by_key(|(sequence, ..)| *sequence);
+    for (_, id, velocity) in known {
+        map.set_row_times(id, times);
+        retime(context, map, id, &velocity);
+    }
+}
 
 /// Corrects a keyframe of a rolling-shutter camera for the velocity that it had.
 pub(crate) fn retime(context: &Context, map: &mut Map, keyframe: KeyFrameId, velocity: &Velocity) {

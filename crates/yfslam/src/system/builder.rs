@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{FrameDetections, SavedMap, SetupError, Slam, Statistics};
+use super::{FrameDetections, Readout, ReadoutSearch, SavedMap, SetupError, Slam, Statistics};
 use crate::backend::{Backend, MapOwner};
 use crate::camera::Camera;
-use crate::config::{Config, DenseConfig, DepthSource};
+use crate::config::{Config, DenseConfig, DepthSource, ReadoutEstimation};
 use crate::context::Context;
 use crate::dense::{DenseMap, DenseMapper};
 use crate::detect::Detector;
@@ -17,7 +17,7 @@ use crate::features::stereo_worker::{METRES_PER_UNIT, StereoWorker};
 use crate::features::{Features, OrbExtractor};
 use crate::image::{DepthImage, GrayImage, Image};
 use crate::map::Map;
-use crate::tracking::{ReadoutEstimator, Tracker, TrackingState, TwoViewInitialiser};
+use crate::tracking::{Tracker, TrackingState, TwoViewInitialiser};
 use crate::worker::Execution;
 
 /// What a map from an earlier session is used for.
@@ -125,6 +125,11 @@ impl SlamBuilder {
         if let Some(dense) = dense.as_mut().filter(|_| detections.detects_static_classes()) {
             dense.name_classes(&detections.class_names);
         }
+        let searches_readout = match config.tracking.estimate_readout {
+            ReadoutEstimation::Never => false,
+            ReadoutEstimation::Unknown => camera.readout_ms.is_none(),
+            ReadoutEstimation::Always => true,
+        };
         Ok(Slam {
             filter: filter.unwrap_or_else(|| filter_for(config.dynamic.method, config.dynamic.seed)),
             needs_boxes,
@@ -140,7 +145,12 @@ impl SlamBuilder {
             extractor,
             gray: GrayImage::default(),
             frame_times: FrameTimes::new(&camera),
-            readout_estimator: Some(ReadoutEstimator::default()),
+            readout_search: searches_readout.then(ReadoutSearch::default),
+            readout: Readout {
+                in_use_ms: camera.readout_ms.unwrap_or(0.0),
+                from_camera: camera.readout_ms.is_some(),
+                ..Readout::default()
+            },
             stereo,
             sparse_depth: Arc::new(DepthImage {
                 raw: Image::new(camera.width, camera.height),

@@ -4,7 +4,7 @@ use std::sync::PoisonError;
 
 use nalgebra::Point3;
 
-use super::{Anchor, MapUse, Pass, Slam};
+use super::{MapUse, Pass, Slam};
 use crate::frame::Frame;
 use crate::image::DepthImage;
 use crate::loops::{SearchRegion, relocalise};
@@ -76,34 +76,6 @@ impl Slam {
             self.filter.settle_doubts(&config.dynamic, &self.tracker.current.features);
         }
         tracked
-    }
-
-    /// Takes over what the frame has shown about the velocity of the last one: its pose, and the features of a keyframe.
-    fn correct_last_frame(&mut self) {
-        let Some(velocity) = self.tracker.last_velocity else { return };
-        if let Some(estimator) = &mut self.readout_estimator {
-            self.tracker.estimate_readout(&self.context, self.owner.map(), estimator);
-            if self.statistics.frames % 50 == 0 {
-                if let Some(e) = estimator.estimate() {
-                    eprintln!(
-                        "READOUT {} {:.2} ms sigma {:.2} keyframes {}",
-                        self.statistics.frames,
-                        e.readout_s * 1e3,
-                        e.sigma_s * 1e3,
-                        e.keyframes
-                    );
-                }
-            }
-        }
-        let (timestamp_ns, relative_pose) = self.tracker.last_pose();
-        if let (Some(anchor), Some((reference, t_cam_reference))) = (self.anchors.last_mut(), relative_pose)
-            && anchor.timestamp_ns == timestamp_ns
-        {
-            *anchor = Anchor { timestamp_ns, reference, t_cam_reference };
-        }
-        if self.tracker.last_was_keyframe() && !self.is_map_frozen() {
-            self.owner.retime(timestamp_ns, &velocity);
-        }
     }
 
     /// Searches the whole map for the place that the frame shows, and tracks the frame there.

@@ -10,6 +10,7 @@ mod localise;
 mod results;
 mod saved_map;
 mod sense;
+mod shutter;
 mod times;
 mod tracked;
 
@@ -29,12 +30,14 @@ use crate::geometry::Pose;
 use crate::image::{DepthImage, GrayImage};
 use crate::loops::LoopClosure;
 use crate::map::KeyFrameId;
-use crate::tracking::{ReadoutEstimator, Tracker, TrackingState, TwoViewInitialiser};
+use crate::tracking::{Tracker, TrackingState, TwoViewInitialiser};
 pub use builder::{MapUse, SlamBuilder};
 pub use errors::{FrameRejected, SetupError};
 use frame_detections::FrameDetections;
 pub use results::Statistics;
 pub use saved_map::SavedMap;
+pub use shutter::Readout;
+use shutter::ReadoutSearch;
 pub use times::StageTimes;
 use times::Stopwatch;
 pub use tracked::Tracked;
@@ -47,7 +50,8 @@ pub struct Slam {
     /// When the rows of the images of a frame are read.
     frame_times: FrameTimes,
     /// Estimates the readout time while it is not known.
-    readout_estimator: Option<ReadoutEstimator>,
+    readout_search: Option<ReadoutSearch>,
+    readout: Readout,
     /// Matches right images, where depth comes from stereo.
     stereo: Option<StereoWorker>,
     /// The depth image of a camera that has none, or whose depth is not used: zero, but around features that have a depth from stereo.

@@ -1,6 +1,6 @@
 //! What can be asked of the system between frames.
 
-use super::Slam;
+use super::{Readout, Slam};
 use crate::dense::{DenseError, DenseView};
 use crate::detect::Detection;
 use crate::dynamic::Region;
@@ -12,7 +12,7 @@ use crate::map::{KeyFrameId, Map};
 use crate::map::{MapError, persist::encode};
 
 /// Counts over all frames of a session.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Statistics {
     /// Frames that were not rejected.
@@ -29,6 +29,8 @@ pub struct Statistics {
     pub first_keyframe: u64,
     /// Whether mapping on its own thread has ended by a panic, so that the map can no longer grow.
     pub mapping_has_ended: bool,
+    /// How the readout time of the rows of an image is known.
+    pub readout: Readout,
     /// Keyframe patches of the dense map.
     pub dense_patches: usize,
     /// Keyframe patches that were left out because the thread of the dense map was busy.
@@ -48,6 +50,7 @@ impl Slam {
     pub fn statistics(&self) -> Statistics {
         let mut statistics = self.statistics;
         statistics.first_keyframe = self.first_keyframe;
+        statistics.readout = self.readout;
         statistics.mapping_has_ended = !self.owner.is_alive();
         if let Some(dense) = &self.dense {
             statistics.dense_patches = dense.len();

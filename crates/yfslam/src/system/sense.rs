@@ -153,7 +153,7 @@ impl Slam {
         }
         let depth_after = measured.and(frame.depth_timestamp_ns).map_or(0, |ns| ns.saturating_sub(frame.timestamp_ns));
         let times = self.frame_times.with_depth_after(depth_after as f64 * 1e-9);
-        if !times.is_instant() || self.readout_estimator.is_some() {
+        if !times.is_instant() || self.readout_search.is_some() {
             current.features.keep_measured(times);
         }
         current.clear_matches();

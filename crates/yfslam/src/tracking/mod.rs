@@ -16,14 +16,14 @@ mod visibility_check;
 use crate::context::Context;
 use crate::dynamic::{DynamicFilter, FirstPose};
 use crate::features::matching::RotationHistogram;
-use crate::features::rolling_shutter::Velocity;
+use crate::features::rolling_shutter::{FrameTimes, Velocity};
 use crate::geometry::Pose;
 use crate::image::DepthImage;
 use crate::map::{KeyFrameId, KeyframeRelativePose, LandmarkId, Map};
 use keyframe_policy::{FrameSummary, is_keyframe_wanted};
 use local_map::LocalMap;
 use motion::Interval;
-pub(crate) use readout_estimator::{ReadoutEstimate, ReadoutEstimator};
+pub(crate) use readout_estimator::ReadoutEstimator;
 use search::{search_keyframe, search_last_frame, search_local_map};
 pub use state::{LostReason, TrackingState};
 pub(crate) use tracked_frame::{Match, TrackedFrame};
@@ -278,6 +278,12 @@ impl Tracker {
         self.current.t_cam_world = self.last.t_cam_world;
         self.current.reference = self.last.reference;
         self.inliers = 0;
+    }
+
+    /// Sets how the rows of the images are read, once that is known.
+    pub(crate) fn set_row_times(&mut self, times: &FrameTimes) {
+        self.last.features.set_row_times(times);
+        self.current.features.set_row_times(times);
     }
 
     /// Lets the last frame, whose velocity is known now, tell about the readout time.

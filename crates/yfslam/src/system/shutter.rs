@@ -1,0 +1,91 @@
+//! The rolling shutter over time: what a frame shows about the one before it, and the readout time where the camera does not tell it.
+
+use super::{Anchor, Slam};
+use crate::features::rolling_shutter::{FrameTimes, RowTimes};
+use crate::tracking::ReadoutEstimator;
+
+/// Estimates that follow each other: each is made with the poses that the one before has corrected.
+const ROUNDS: usize = 3;
+
+/// Standard deviations by which a readout time differs from that of a global shutter.
+const ROLLING_SIGMAS: f64 = 5.0;
+
+/// How the readout time of the rows of an image is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Readout {
+    /// Time from the first to the last row that is in use, ms; 0 is a global shutter.
+    pub in_use_ms: f64,
+    /// Whether the camera told it. If it did not, it was estimated, or a global shutter is assumed.
+    pub from_camera: bool,
+    /// The estimate, ms, where the camera did not tell it.
+    pub estimate_ms: Option<f64>,
+    /// Standard deviation of the estimate, ms.
+    pub sigma_ms: Option<f64>,
+    /// Whether the estimate was certain enough to be used.
+    pub is_certain: bool,
+}
+
+/// The estimate of the readout time while it is under way.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ReadoutSearch {
+    pub(super) estimator: ReadoutEstimator,
+    round: usize,
+}
+
+impl Slam {
+    /// Takes over what the frame has shown about the velocity of the last one: its pose, the features of a keyframe, and what it says about
+    /// the readout time.
+    pub(super) fn correct_last_frame(&mut self) {
+        let Some(velocity) = self.tracker.last_velocity else { return };
+        let (timestamp_ns, relative_pose) = self.tracker.last_pose();
+        if let (Some(anchor), Some((reference, t_cam_reference))) = (self.anchors.last_mut(), relative_pose)
+            && anchor.timestamp_ns == timestamp_ns
+        {
+            *anchor = Anchor { timestamp_ns, reference, t_cam_reference };
+        }
+        if self.tracker.last_was_keyframe() && !self.is_map_frozen() {
+            self.owner.retime(timestamp_ns, &velocity);
+        }
+        if let Some(mut search) = self.readout_search.take() {
+            self.tracker.estimate_readout(&self.context, self.owner.map(), &mut search.estimator);
+            self.readout_search = self.conclude(search);
+        }
+    }
+
+    /// Uses the estimate of the readout time once it is certain. Returns the search if it has to go on.
+    fn conclude(&mut self, mut search: ReadoutSearch) -> Option<ReadoutSearch> {
+        let config = &self.context.config.tracking;
+        let Some(estimate) = search.estimator.estimate() else { return Some(search) };
+        let (readout_ms, sigma_ms) = (1e3 * estimate.readout_s, 1e3 * estimate.sigma_s);
+        self.readout.estimate_ms = Some(readout_ms);
+        self.readout.sigma_ms = Some(sigma_ms);
+        let camera = &self.context.sensor.camera;
+        let is_possible = readout_ms.abs() <= 1e3 / camera.fps;
+        let is_precise = sigma_ms <= config.readout_max_sigma_ms;
+        let is_rolling = readout_ms.abs() >= config.readout_min_ms.max(ROLLING_SIGMAS * sigma_ms);
+        self.readout.is_certain = estimate.keyframes >= config.readout_min_keyframes && is_precise && is_possible;
+        if self.readout.from_camera || estimate.keyframes < config.readout_min_keyframes {
+            return Some(search);
+        }
+        match (is_precise, is_rolling && is_possible) {
+            (true, true) => {}
+            // At first, a rough value is better than none.
+            (false, true) if search.round == 0 => {}
+            (false, _) => return Some(search),
+            // A global shutter, or something that the model does not describe: the images are used as they are.
+            (true, false) => return None,
+        }
+        self.readout.in_use_ms = readout_ms;
+        let color = RowTimes::new(camera, readout_ms);
+        let depth = camera.depth_readout_ms.map_or(color, |ms| RowTimes::new(camera, ms));
+        self.frame_times = FrameTimes { color, depth, ..self.frame_times };
+        self.tracker.set_row_times(&self.frame_times);
+        if !self.is_map_frozen() {
+            self.owner.set_row_times(&self.frame_times);
+        }
+        search.round += 1;
+        search.estimator = ReadoutEstimator::default();
+        (search.round < ROUNDS).then_some(search)
+    }
+}
