@@ -38,6 +38,22 @@ fn a_written_world_is_tracked_to_the_same_bits_as_the_rendered_one_also_with_box
 }
 
 #[test]
+fn the_camera_file_has_the_readout_that_the_world_mentions_and_does_not_withhold() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = |query: &str, out: &str| -> toml::Table {
+        let world = format!("walking_xyz?people=0&width=64&height=48&frames=2{query}");
+        succeeds(folder.path(), &["synth", &world, "--out", out, "-q"]);
+        toml::from_str(&fs::read_to_string(folder.path().join(out).join("camera.toml")).unwrap()).unwrap()
+    };
+    let told = camera("&readout=30&depth_readout=-20&offset_ms=8", "told");
+    let ms = ["readout_ms", "depth_readout_ms", "depth_delay_ms"].map(|key| told[key].as_float().unwrap());
+    assert_eq!(ms, [30.0, -20.0, 0.0], "the stamps contain the whole offset");
+    for (query, out) in [("", "global"), ("&readout=30&unknown_readout=on", "withheld")] {
+        assert!(camera(query, out).keys().all(|key| !key.ends_with("_ms")), "{query}");
+    }
+}
+
+#[test]
 fn boxes_masks_settings_and_lists_equal_those_of_the_world() {
     let folder = tempfile::tempdir().unwrap();
     let rec = folder.path().join("rec");

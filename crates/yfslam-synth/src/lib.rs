@@ -32,6 +32,17 @@
 //! `stereo=0.11` adds a right camera 0.11 m beside the camera, instead of depth; [`World::second_view`] renders the image of any
 //! other camera that is fixed to it.
 //!
+//! # Shutter
+//!
+//! The shutter is global unless `readout=` gives the time from the first to the last row of an image in ms: 30 reads the top row
+//! first, -30 the bottom row. Each row then shows the camera, the people and the light at its own time, to the bit as the same row
+//! of a global image would at that time, in colour and depth, in the right image and in a second view; so do the exact depth, the
+//! masks and the boxes of a frame. The stamp and the pose of a frame are those of the middle row; [`World::row_pose`] has those of
+//! the others. `depth_readout=` is that of the depth image, about its own middle row, which `offset_ms=` puts at another time. The
+//! [`Camera`](yfslam::Camera) of a described world has the readout, unless none is mentioned or `unknown_readout=on` withholds it.
+//!
+//! # Light
+//!
 //! Light can change: with `flicker=` the brightness of about half of the lamps varies and drops out, `exposure=` darkens the whole
 //! image.
 //!

@@ -24,13 +24,14 @@ Examples:
   yfslam synth walking_xyz -o walk && yfslam run walk
   yfslam synth 'sitting_rpy?seed=7&frames=900' --camera tum1 -o sit
   yfslam synth 'walking_xyz?stereo=0.11' -o pairs             a stereo camera with a baseline of 0.11 m
+  yfslam synth 'walking_rpy?readout=30' -o rolling            a rolling shutter: 30 ms from the first to the last row
   yfslam synth walking_static --fault covered@2+1 --fault nan-stamp@5+0.5 -o faulty
 
 Files in the folder:
   rgb/ depth/ rgb.txt depth.txt associations.txt   images and lists, as in the TUM RGB-D benchmark
   right/ right.txt                                 right images instead of depth, of a stereo camera
   groundtruth.txt                                  exact pose of every frame, also of frames with faults
-  camera.toml                                      camera
+  camera.toml                                      camera, with the readout of its rows if the world mentions it
   boxes.json                                       class, instance and exact bounding box of movable objects, for `yfslam run`
   masks/                                           mask of each frame with instances, 0 for static pixels, for `yfslam run --masks`
   world.toml                                       all settings of the world

@@ -11,6 +11,7 @@ mod synth;
 use std::path::Path;
 
 use anyhow::Result;
+use yfslam::Camera;
 use yfslam::config::DepthSource;
 use yfslam_eval::StampedPose;
 use yfslam_io::sequence::{AssociationReport, GroundTruthReader};
@@ -48,6 +49,14 @@ pub struct Source {
     pub mirror: Option<TimeMirror>,
 }
 
+/// Turns the shutter of a camera around: when time runs backward, the row that was read last comes first.
+fn reverse_readout(camera: &mut Camera) {
+    for ms in [&mut camera.readout_ms, &mut camera.depth_readout_ms, &mut camera.depth_delay_ms] {
+        // Not the negative value, which would make -0 of 0.
+        *ms = ms.map(|ms| 0.0 - ms);
+    }
+}
+
 /// The true trajectory.
 pub struct Truth {
     /// File, or synthetic world.
@@ -63,11 +72,15 @@ impl Source {
     /// # Errors
     /// Input that cannot be read, with file, value and what to do.
     pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Self> {
-        if args.is_synthetic() {
-            synth::open(args, configured, own_boxes)
+        let mut source = if args.is_synthetic() {
+            synth::open(args, configured, own_boxes)?
         } else {
-            folder::open(args, configured, own_boxes)
+            folder::open(args, configured, own_boxes)?
+        };
+        if source.mirror.is_some() {
+            reverse_readout(&mut source.camera.camera);
         }
+        Ok(source)
     }
 
     /// Returns the exact trajectory of a synthetic world.

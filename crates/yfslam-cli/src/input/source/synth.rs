@@ -65,7 +65,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let renderer = Renderer::start(world, part.clone(), classes)?;
     Ok(Source {
         name: name.into(),
-        camera: part.camera(&config),
+        camera: world_camera(&config),
         mirror: part.mirror,
         depth_source,
         frames: Frames::new(Player::Synth(renderer), depth_source, args, &stamps_ns),
@@ -107,18 +107,6 @@ impl Part {
     /// Returns the time at which what happens in the world at `stamp_ns` is played.
     fn played_ns(&self, stamp_ns: i64) -> i64 {
         self.mirror.map_or(stamp_ns, |mirror| mirror.apply(stamp_ns))
-    }
-
-    /// Returns the camera as it is when time runs as it is played: backward, the row that was read last comes first.
-    fn camera(&self, config: &WorldConfig) -> CameraSource {
-        let mut source = world_camera(config);
-        if self.mirror.is_some() {
-            let camera = &mut source.camera;
-            for ms in [&mut camera.readout_ms, &mut camera.depth_readout_ms, &mut camera.depth_delay_ms] {
-                *ms = ms.map(|ms| 0.0 - ms);
-            }
-        }
-        source
     }
 }
 
