@@ -130,7 +130,12 @@ impl FrameFeatures {
 
     /// Brings all features to the time of the middle row, for a camera with that velocity. `depth_of` a feature stands for a depth that
     /// was not measured, m.
-    pub(crate) fn to_middle_row(&mut self, velocity: &Velocity, pinhole: &Pinhole, depth_of: impl Fn(usize) -> f64) {
+    pub(crate) fn move_to_middle_row(
+        &mut self,
+        velocity: &Velocity,
+        pinhole: &Pinhole,
+        depth_of: impl Fn(usize) -> f64,
+    ) {
         self.velocity = Some(*velocity);
         if self.times.is_instant() {
             return;

@@ -175,7 +175,7 @@ impl Map {
         }
     }
 
-    /// Brings the features of a keyframe to the time of their middle row; see [`FrameFeatures::to_middle_row`].
+    /// Brings the features of a keyframe to the time of their middle row; see [`FrameFeatures::move_to_middle_row`].
     pub(crate) fn retime_features(
         &mut self,
         keyframe: KeyFrameId,
@@ -184,7 +184,7 @@ impl Map {
         depth_of: impl Fn(usize) -> f64,
     ) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
-            k.features.to_middle_row(velocity, pinhole, depth_of);
+            k.features.move_to_middle_row(velocity, pinhole, depth_of);
         }
     }
 

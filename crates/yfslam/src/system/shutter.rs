@@ -22,6 +22,9 @@ pub struct Readout {
     pub estimate_ms: Option<f64>,
     /// Standard deviation of the estimate, ms.
     pub sigma_ms: Option<f64>,
+    /// Mean of the squared residual of the depths, in units of their variance, over the frames from which the estimate was made: least where
+    /// the delay between colour and depth images is right.
+    pub depth_residual: Option<f64>,
     /// Whether the estimate was certain enough to be used.
     pub is_certain: bool,
 }
@@ -31,6 +34,8 @@ pub struct Readout {
 pub(super) struct ReadoutSearch {
     pub(super) estimator: ReadoutEstimator,
     round: usize,
+    /// Sum of the mean squared residuals of the depths, and their number.
+    depth_residuals: (f64, usize),
 }
 
 impl Slam {
@@ -48,6 +53,11 @@ impl Slam {
             self.owner.retime(timestamp_ns, &velocity);
         }
         if let Some(mut search) = self.readout_search.take() {
+            if let Some(residual) = self.tracker.current.depth_residual(&self.context.sensor) {
+                let (sum, count) = &mut search.depth_residuals;
+                (*sum, *count) = (*sum + residual, *count + 1);
+                self.readout.depth_residual = Some(*sum / *count as f64);
+            }
             self.tracker.estimate_readout(&self.context, self.owner.map(), &mut search.estimator);
             self.readout_search = self.conclude(search);
         }

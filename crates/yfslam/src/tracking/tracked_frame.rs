@@ -67,6 +67,17 @@ impl TrackedFrame {
         pose_covariance(&sensor.pinhole, &self.t_cam_world, &self.observations)
     }
 
+    /// Returns the mean squared residual of the depths of the inliers of the last refinement, in units of their variance.
+    pub(crate) fn depth_residual(&self, sensor: &SensorModel) -> Option<f64> {
+        let with_depth = self.observations.iter().filter(|o| o.inlier && o.measurement.weight_disparity > 0.0);
+        let squared = |o: &PoseObservation| {
+            let p = (self.t_cam_world * o.point_world).coords;
+            o.measurement.residual(&sensor.pinhole, &p).z.powi(2) * o.measurement.weight_disparity
+        };
+        let (sum, count) = with_depth.map(squared).fold((0.0, 0usize), |(sum, count), one| (sum + one, count + 1));
+        (count > 0).then(|| sum / count as f64)
+    }
+
     /// Removes all matches.
     pub(crate) fn clear_matches(&mut self) {
         self.matches.clear();
@@ -114,7 +125,7 @@ impl TrackedFrame {
             false => *self.depths.select_nth_unstable_by(middle, f64::total_cmp).1,
         };
         let matches = &self.matches;
-        self.features.to_middle_row(velocity, &sensor.pinhole, |i| {
+        self.features.move_to_middle_row(velocity, &sensor.pinhole, |i| {
             matches.get(i).and_then(Option::as_ref).map(depth_of).filter(|z| *z > 0.0).unwrap_or(median)
         });
     }
