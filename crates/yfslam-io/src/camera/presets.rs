@@ -30,7 +30,14 @@ pub fn preset(name: &str) -> Option<CameraSource> {
         }
         _ => return None,
     };
+    // Fitted by `yfslam calibrate`; the others are estimated in each run.
+    let readout_ms = match &*name {
+        "tum1" => Some(25.0),
+        "bonn" => Some(30.0),
+        _ => None,
+    };
     let [fx, fy, cx, cy] = intrinsics;
-    let camera = Camera::pinhole(640, 480, fx, fy, cx, cy).with_distortion(distortion);
+    let mut camera = Camera::pinhole(640, 480, fx, fy, cx, cy).with_distortion(distortion);
+    camera.readout_ms = readout_ms;
     Some(CameraSource { camera, depth_factor, origin: format!("preset {name}"), unused_keys: Vec::new() })
 }

@@ -13,7 +13,7 @@ use crate::dense::fusion::FusionOwner;
 use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
 use crate::dense::object_masks::ObjectMasks;
 use crate::dense::volume::Volume;
-use crate::dense::{DenseError, DenseMap, PlacedPatch};
+use crate::dense::{DenseError, DenseMap, PlacedPatch, RowShift};
 use crate::detect::Detection;
 use crate::dynamic::MovingMask;
 use crate::geometry::Pose;
@@ -43,7 +43,9 @@ pub(crate) struct Source<'a> {
     pub color: &'a RgbImage,
     /// The depth image.
     pub depth: &'a DepthImage,
-    /// The pixels that move.
+    /// How a rolling shutter has shifted the rows of both.
+    pub shift: Option<&'a RowShift>,
+    /// The pixels that move, in the images as they were read.
     pub moving: &'a MovingMask,
     /// Detections of objects that cannot move; `None` if no detector searched for them.
     pub objects: Option<&'a [Detection]>,
@@ -113,12 +115,19 @@ impl DenseMapper {
 
     /// Extracts the patch of a frame, with the classes of static objects where they are known.
     pub(crate) fn extract(&self, dynamic: &DynamicConfig, source: &Source<'_>) -> KeyframePatch {
-        let Source { color, depth, moving, objects } = source;
-        let moves = |at, edge| moving.covers(depth, at, edge);
-        let patch = KeyframePatch::extract(&self.config, &self.grid, color, depth, moves);
+        let Source { color, depth, shift, moving, objects } = source;
+        let as_read = |at| shift.map_or(at, |shift| shift.in_color(at));
+        let moves = |at, edge| moving.covers(depth, as_read(at), edge);
+        let patch = match shift {
+            None => KeyframePatch::extract(&self.config, &self.grid, color, depth, moves),
+            Some(shift) => {
+                let (color, depth) = (shift.corrected_color(color), shift.corrected_depth(depth));
+                KeyframePatch::extract(&self.config, &self.grid, &color, &depth, moves)
+            }
+        };
         let Some((ids, objects)) = self.class_ids.as_ref().zip(*objects) else { return patch };
         let masks = ObjectMasks::segment(dynamic, objects, depth, moving);
-        let id = |at| masks.class_at(at).and_then(|class| ids.get(class).copied()).unwrap_or_default();
+        let id = |at| masks.class_at(as_read(at)).and_then(|class| ids.get(class).copied()).unwrap_or_default();
         patch.with_classes(&self.grid, id)
     }
 

@@ -29,6 +29,7 @@ mod object_masks;
 mod persist;
 #[cfg(test)]
 mod scene;
+mod shutter;
 mod static_recovery;
 mod trace;
 mod view;
@@ -44,6 +45,7 @@ pub use grid::{GridCell, GroundGrid, ground_grid};
 pub use keyframe_patch::{CellGrid, KeyframePatch};
 pub(crate) use mapper::{DenseMapper, Source};
 pub use mesh::{Mesh, mesh};
+pub(crate) use shutter::RowShift;
 pub use view::DenseView;
 pub use volume::{KnownVoxel, Volume};
 pub use voxels::{Block, SIDE as BLOCK_SIDE, Voxel, center_m, voxel_at};

@@ -73,7 +73,7 @@ impl FrameTimes {
     }
 
     /// Returns when a row of the depth image is read, s.
-    fn depth_seconds(&self, row: f64) -> f64 {
+    pub(crate) fn depth_seconds(&self, row: f64) -> f64 {
         self.depth_delay_s + self.depth.seconds(row)
     }
 }
@@ -100,6 +100,24 @@ pub(crate) fn at_time_zero(point: &Vector3<f64>, velocity: &Velocity, seconds: f
     let (linear, angular) = (velocity.fixed_rows::<3>(0), velocity.fixed_rows::<3>(3));
     let rate = linear + angular.cross(point);
     point + (rate + angular.cross(&rate) * (0.5 * seconds)) * seconds
+}
+
+/// Returns where a point of the camera frame at time 0 lies in the camera frame when the depth image reads its row.
+pub(crate) fn at_depth_time(
+    point: &Vector3<f64>,
+    times: &FrameTimes,
+    velocity: &Velocity,
+    camera: &Camera,
+) -> Vector3<f64> {
+    let mut seen = *point;
+    for _ in 0..2 {
+        if seen.z <= 0.0 {
+            break;
+        }
+        let [_, row] = camera.distort(seen.x / seen.z, seen.y / seen.z);
+        seen = at_time_zero(point, &-velocity, times.depth_seconds(row));
+    }
+    seen
 }
 
 impl Measured {
@@ -145,14 +163,11 @@ impl Measured {
         }
         let Some(first_guess) = self.depth_m else { return };
         let point = self.point(times, velocity, &Pinhole::from(camera), f64::from(first_guess));
-        let mut at = [0.0, f64::from(self.row)];
-        for _ in 0..2 {
-            let seen = at_time_zero(&point, &-velocity, times.depth_seconds(at[1]));
-            if seen.z <= 0.0 {
-                return;
-            }
-            at = camera.distort(seen.x / seen.z, seen.y / seen.z);
+        let seen = at_depth_time(&point, times, velocity, camera);
+        if seen.z <= 0.0 {
+            return;
         }
+        let at = camera.distort(seen.x / seen.z, seen.y / seen.z);
         let [x, y] = at.map(|v| v + 0.5);
         if x >= 0.0 && y >= 0.0 {
             self.depth_m = depth.metres(x as usize, y as usize);

@@ -3,7 +3,7 @@
 use nalgebra::Matrix6;
 
 use super::{Anchor, Pass, Slam, Tracked};
-use crate::dense::Source;
+use crate::dense::{RowShift, Source};
 use crate::frame::Frame;
 use crate::tracking::{LostReason, TrackingState};
 
@@ -68,7 +68,16 @@ impl Slam {
         }
         pass.clock.lap();
         let moving = self.filter.moving_mask(&self.context.config.dynamic, depth);
-        let source = Source { color: &frame.color, depth, moving: &moving, objects: self.detections.static_objects() };
+        let features = &self.tracker.current.features;
+        let camera = &self.context.sensor.camera;
+        let shift = features.velocity().and_then(|velocity| RowShift::new(camera, features.times(), velocity, depth));
+        let source = Source {
+            color: &frame.color,
+            depth,
+            shift: shift.as_ref(),
+            moving: &moving,
+            objects: self.detections.static_objects(),
+        };
         let patch = mapper.extract(&self.context.config.dynamic, &source);
         pass.times.dense_patch = pass.clock.lap();
         mapper.insert(frame.timestamp_ns, relative_pose, patch, self.owner.map());

@@ -246,8 +246,8 @@ impl Tracker {
         self.found.extend(self.current.matches.iter().flatten().filter_map(|matched| matched.landmark));
         self.found.sort_unstable();
         for &id in self.visible.iter().filter(|id| self.found.binary_search(id).is_err()) {
-            let pose = &self.current.t_cam_world;
-            if map.landmark(id).is_some_and(|l| is_free_space(config, sensor, depth, pose, &l.position)) {
+            let frame = &self.current;
+            if map.landmark(id).is_some_and(|l| is_free_space(config, sensor, depth, frame, &l.position)) {
                 self.observation_counts.in_free_space.push(id);
             }
         }

@@ -7,8 +7,9 @@ use nalgebra::{Point3, Vector3};
 
 use crate::config::FullConfig;
 use crate::context::SensorModel;
-use crate::geometry::Pose;
+use crate::features::rolling_shutter::at_depth_time;
 use crate::image::DepthImage;
+use crate::tracking::tracked_frame::TrackedFrame;
 
 /// Distance of the four further pixels at which depth is read, px: corners often lie on the edge of an object.
 const AROUND_PX: f64 = 8.0;
@@ -18,10 +19,13 @@ pub(super) fn is_free_space(
     config: &FullConfig,
     sensor: &SensorModel,
     depth: &DepthImage,
-    t_cam_world: &Pose,
+    frame: &TrackedFrame,
     point_world: &Point3<f64>,
 ) -> bool {
-    let p: Vector3<f64> = (t_cam_world * point_world).coords;
+    let mut p: Vector3<f64> = (frame.t_cam_world * point_world).coords;
+    if let Some(velocity) = frame.features.velocity().filter(|_| !frame.features.times().is_instant()) {
+        p = at_depth_time(&p, frame.features.times(), velocity, &sensor.camera);
+    }
     let min_depth_m = (1.0 + f64::from(config.free_space_margin_share)) * p.z + f64::from(config.free_space_margin_m);
     let (x, y) = (p.x / p.z, p.y / p.z);
     let [u, v] = sensor.camera.distort(x, y);
@@ -39,6 +43,7 @@ mod tests {
     use super::*;
     use crate::camera::Camera;
     use crate::config::Config;
+    use crate::geometry::Pose;
     use crate::image::Image;
 
     #[test]
@@ -52,8 +57,9 @@ mod tests {
             let mut raw = Image::new(640, 480);
             (0..480).for_each(|y| (0..640).for_each(|x| raw.row_mut(y)[x] = depth_of(x)));
             let depth = DepthImage { raw, metres_per_unit: 1.0 / 5000.0 };
-            let pose = Pose::translation(0.0, 0.0, 1.0);
-            is_free_space(&config.dynamic.full, &sensor, &depth, &pose, &Point3::new(0.0, 0.0, 1.0))
+            let mut frame = TrackedFrame::default();
+            frame.t_cam_world = Pose::translation(0.0, 0.0, 1.0);
+            is_free_space(&config.dynamic.full, &sensor, &depth, &frame, &Point3::new(0.0, 0.0, 1.0))
         };
         assert!(is_free(&|_| 15_000), "a wall at 3 m");
         assert!(!is_free(&|_| 10_500), "the object itself, with noise");

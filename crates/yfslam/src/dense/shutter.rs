@@ -1,0 +1,145 @@
+//! Images of a rolling shutter as a global shutter would have seen them while the middle row of the colour image was read.
+//!
+//! In: a frame, its row times, the velocity of the camera. Out: where each pixel of the corrected image lies in the images as they were
+//! read, and the corrected images. The shift is computed on a coarse grid and interpolated: it changes slowly over the image.
+
+use nalgebra::Vector3;
+
+use crate::camera::Camera;
+use crate::features::rolling_shutter::{FrameTimes, Velocity, at_time_zero};
+use crate::image::{DepthImage, Image, RgbImage};
+
+/// Distance of the points of the coarse grid, px.
+const STEP_PX: usize = 8;
+
+/// Where a pixel lies in the images as they were read.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shift {
+    /// Shift in the colour image, px.
+    color: [f32; 2],
+    /// Shift in the depth image, px.
+    depth: [f32; 2],
+    /// What the depth at the time of the middle row is more than the measured one, m.
+    deeper_m: f32,
+}
+
+/// The shift of the rows of one frame.
+#[derive(Clone, Debug)]
+pub(crate) struct RowShift {
+    columns: usize,
+    rows: usize,
+    shifts: Vec<Shift>,
+}
+
+impl RowShift {
+    /// Computes the shift for a camera with that velocity; `None` if colour and depth show one instant.
+    pub(crate) fn new(camera: &Camera, times: &FrameTimes, velocity: &Velocity, depth: &DepthImage) -> Option<Self> {
+        if times.is_instant() {
+            return None;
+        }
+        let [columns, rows] = [camera.width, camera.height].map(|side| side.div_ceil(STEP_PX) + 1);
+        let typical_m = typical_depth_m(depth)?;
+        let point = |i: usize| [(i % columns) * STEP_PX, (i / columns) * STEP_PX];
+        let shifts =
+            (0..columns * rows).map(|i| shift_at(camera, times, velocity, depth, point(i), typical_m)).collect();
+        Some(Self { columns, rows, shifts })
+    }
+
+    /// Returns where a pixel of the corrected image lies in the colour image as it was read, px.
+    pub(crate) fn in_color(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let Shift { color: [dx, dy], .. } = self.at(x, y);
+        [x + dx, y + dy]
+    }
+
+    /// Returns the corrected colour image.
+    pub(crate) fn corrected_color(&self, color: &RgbImage) -> RgbImage {
+        let mut corrected = Image::new(color.width(), color.height());
+        for y in 0..color.height() {
+            for (x, pixel) in corrected.row_mut(y).iter_mut().enumerate() {
+                let Shift { color: [dx, dy], .. } = self.at(x as f32, y as f32);
+                *pixel = nearest(color, x as f32 + dx, y as f32 + dy).unwrap_or_default();
+            }
+        }
+        corrected
+    }
+
+    /// Returns the corrected depth image.
+    pub(crate) fn corrected_depth(&self, depth: &DepthImage) -> DepthImage {
+        let mut raw = Image::new(depth.raw.width(), depth.raw.height());
+        for y in 0..raw.height() {
+            for (x, pixel) in raw.row_mut(y).iter_mut().enumerate() {
+                let Shift { depth: [dx, dy], deeper_m, .. } = self.at(x as f32, y as f32);
+                let measured = nearest(&depth.raw, x as f32 + dx, y as f32 + dy).unwrap_or(0);
+                if measured > 0 {
+                    let units = f32::from(measured) + deeper_m / depth.metres_per_unit;
+                    *pixel = (units + 0.5).max(1.0) as u16;
+                }
+            }
+        }
+        DepthImage { raw, metres_per_unit: depth.metres_per_unit }
+    }
+
+    /// Interpolates the shift at a pixel.
+    fn at(&self, x: f32, y: f32) -> Shift {
+        let [gx, gy] = [x, y].map(|v| v.max(0.0) / STEP_PX as f32);
+        let (column, row) = ((gx as usize).min(self.columns - 2), (gy as usize).min(self.rows - 2));
+        let (fx, fy) = (gx - column as f32, gy - row as f32);
+        let corner = |c: usize, r: usize| &self.shifts[(row + r) * self.columns + column + c];
+        let mix = |part: &dyn Fn(&Shift) -> f32| {
+            let upper = part(corner(0, 0)) * (1.0 - fx) + part(corner(1, 0)) * fx;
+            let lower = part(corner(0, 1)) * (1.0 - fx) + part(corner(1, 1)) * fx;
+            upper * (1.0 - fy) + lower * fy
+        };
+        Shift {
+            color: [mix(&|s| s.color[0]), mix(&|s| s.color[1])],
+            depth: [mix(&|s| s.depth[0]), mix(&|s| s.depth[1])],
+            deeper_m: mix(&|s| s.deeper_m),
+        }
+    }
+}
+
+/// Returns the pixel nearest to a position; `None` outside the image.
+fn nearest<T: Copy>(image: &Image<T>, x: f32, y: f32) -> Option<T> {
+    let [x, y] = [x + 0.5, y + 0.5];
+    if x < 0.0 || y < 0.0 { None } else { image.get(x as usize, y as usize).copied() }
+}
+
+/// Returns the median of some depths of the image, which stands for those that were not measured.
+fn typical_depth_m(depth: &DepthImage) -> Option<f64> {
+    let (width, height) = (depth.raw.width(), depth.raw.height());
+    let pixels = (0..height).step_by(STEP_PX).flat_map(|y| (0..width).step_by(STEP_PX).map(move |x| (x, y)));
+    let mut depths: Vec<f32> = pixels.filter_map(|(x, y)| depth.metres(x, y)).collect();
+    let middle = depths.len() / 2;
+    (!depths.is_empty()).then(|| f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1))
+}
+
+/// Computes the shift at a pixel of the corrected image.
+fn shift_at(
+    camera: &Camera,
+    times: &FrameTimes,
+    velocity: &Velocity,
+    depth: &DepthImage,
+    [x, y]: [usize; 2],
+    typical_m: f64,
+) -> Shift {
+    let [ray_x, ray_y] = camera.undistort(x as f64, y as f64);
+    let ray = Vector3::new(ray_x, ray_y, 1.0);
+    let own_m = depth.metres(x.min(camera.width - 1), y.min(camera.height - 1)).map_or(typical_m, f64::from);
+    let point = ray * own_m;
+    let seen_at = |seconds_of_row: &dyn Fn(f64) -> f64| {
+        let mut at = [x as f64, y as f64];
+        let mut seen = point;
+        for _ in 0..2 {
+            seen = at_time_zero(&point, &-velocity, seconds_of_row(at[1]));
+            if seen.z > 0.0 {
+                at = camera.distort(seen.x / seen.z, seen.y / seen.z);
+            }
+        }
+        // The lens model does not return exactly to the pixel from which the ray came.
+        let [own_x, own_y] = camera.distort(ray_x, ray_y);
+        ([(at[0] - own_x) as f32, (at[1] - own_y) as f32], (own_m - seen.z) as f32)
+    };
+    let (color, _) = seen_at(&|row| times.color.seconds(row));
+    let (in_depth, deeper_m) = seen_at(&|row| times.depth_seconds(row));
+    Shift { color, depth: in_depth, deeper_m }
+}
