@@ -129,7 +129,7 @@ impl FrameFeatures {
     }
 
     /// Brings all features to the time of the middle row, for a camera with that velocity. `depth_of` a feature stands for a depth that
-    /// was not measured, m.
+    /// was not measured, m. The search grid stays as it is: after a small change of the velocity it is still right.
     pub(crate) fn move_to_middle_row(
         &mut self,
         velocity: &Velocity,
@@ -148,7 +148,6 @@ impl FrameFeatures {
                 feature.depth_m = measured.depth_m.map(|_| point.z as f32);
             }
         }
-        self.build_grid();
     }
 
     /// Returns whether the features are kept as they were measured.
@@ -164,6 +163,11 @@ impl FrameFeatures {
     /// Sets how the rows of the colour image and of the depth image are read, once that is known.
     pub(crate) fn set_row_times(&mut self, times: &FrameTimes) {
         (self.times.color, self.times.depth) = (times.color, times.depth);
+    }
+
+    /// Notes the velocity of the camera without a correction.
+    pub(crate) fn set_velocity(&mut self, velocity: &Velocity) {
+        self.velocity = Some(*velocity);
     }
 
     /// The velocity to which the features were corrected last.
@@ -230,7 +234,7 @@ impl FrameFeatures {
     }
 
     /// Sorts the features into the cells of the grid, by counting sort.
-    fn build_grid(&mut self) {
+    pub(crate) fn build_grid(&mut self) {
         self.start.clear();
         self.start.resize(GRID_COLUMNS * GRID_ROWS + 1, 0);
         self.order.clear();

@@ -185,6 +185,7 @@ impl Map {
     ) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
             k.features.move_to_middle_row(velocity, pinhole, depth_of);
+            k.features.build_grid();
         }
     }
 

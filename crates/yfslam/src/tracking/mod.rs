@@ -105,20 +105,23 @@ impl Tracker {
         depth: &DepthImage,
         min_inliers: usize,
     ) -> Result<(), LostReason> {
-        self.correct_shutter(context, self.interval.map(|interval| interval.mean()), Some(depth));
+        if self.correct_shutter(context, self.interval.map(|interval| interval.mean()), None) {
+            self.current.features.build_grid();
+        }
         if !self.estimate_first_pose(context, map) {
             return Err(LostReason::TooFewMatches);
         }
-        self.correct_shutter(context, self.current_velocity(context), Some(depth));
+        if self.correct_shutter(context, self.current_velocity(context), Some(depth)) {
+            self.current.features.build_grid();
+        }
         let first = FirstPose { sensor: &context.sensor, map, t_cam_world: &self.current.t_cam_world };
         if filter.after_pose(&context.config.dynamic, &first, &mut self.current.features) {
             self.current.drop_distrusted();
             self.current.refine_pose(context);
         }
         self.track_local_map(context, map, min_inliers)?;
-        if !self.current.features.times().is_instant() {
-            self.correct_shutter(context, self.current_velocity(context), None);
-            self.inliers = self.current.refine_pose(context);
+        if self.correct_shutter(context, self.current_velocity(context), None) {
+            self.inliers = self.current.polish_pose(context);
         }
         self.correct_last(context, map);
         Ok(())
@@ -137,11 +140,11 @@ impl Tracker {
         Some(self.current_interval(context)?.at_end(self.interval.as_ref()))
     }
 
-    /// Brings the features of the current frame to the time of the middle row.
-    fn correct_shutter(&mut self, context: &Context, velocity: Option<Velocity>, depth: Option<&DepthImage>) {
-        if let Some(velocity) = velocity.filter(|_| self.current.features.keeps_measured()) {
-            self.current.correct_shutter(&context.sensor, &velocity, depth);
-        }
+    /// Brings the features of the current frame to the time of the middle row. Returns whether that has moved them.
+    fn correct_shutter(&mut self, context: &Context, velocity: Option<Velocity>, depth: Option<&DepthImage>) -> bool {
+        let Some(velocity) = velocity.filter(|_| self.current.features.keeps_measured()) else { return false };
+        self.current.correct_shutter(&context.sensor, &velocity, depth);
+        !self.current.features.times().is_instant()
     }
 
     /// Corrects the last frame for its velocity, which is known better now, and refines its pose.
@@ -153,7 +156,7 @@ impl Tracker {
         self.last_velocity = Some(velocity);
         let is_corrected = !self.last.features.times().is_instant();
         if is_corrected && !self.last_was_keyframe() && self.last.match_count() > 0 {
-            self.last.refine_pose(context);
+            self.last.polish_pose(context);
             if let Some((reference, _)) = self.last.reference {
                 self.last.set_reference(reference, map);
             }

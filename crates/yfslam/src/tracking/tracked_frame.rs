@@ -4,6 +4,7 @@
 
 use nalgebra::{Matrix6, Point3};
 
+use crate::config::PoseOptimizerConfig;
 use crate::context::{Context, SensorModel};
 use crate::features::FrameFeatures;
 use crate::features::rolling_shutter::Velocity;
@@ -115,6 +116,10 @@ impl TrackedFrame {
         if let Some(depth) = depth {
             self.features.measure_depths(velocity, &sensor.camera, depth);
         }
+        if self.features.times().is_instant() {
+            self.features.set_velocity(velocity);
+            return;
+        }
         let pose = &self.t_cam_world;
         let depth_of = |matched: &Match| (pose * matched.point_world).z;
         self.depths.clear();
@@ -146,7 +151,18 @@ impl TrackedFrame {
 
     /// Refines the pose from all matches and removes the outliers. Returns the number of inliers that are landmarks.
     pub(crate) fn refine_pose(&mut self, context: &Context) -> usize {
-        let (sensor, config) = (&context.sensor, &context.config.pose_optimizer);
+        self.optimize_pose(context, &context.config.pose_optimizer)
+    }
+
+    /// Refines a pose again whose matches are inliers already, after a small change of the features. Returns as
+    /// [`TrackedFrame::refine_pose`].
+    pub(crate) fn polish_pose(&mut self, context: &Context) -> usize {
+        let config = &context.config.pose_optimizer;
+        self.optimize_pose(context, &PoseOptimizerConfig { rounds: 1, robust_rounds: 0, ..config.clone() })
+    }
+
+    fn optimize_pose(&mut self, context: &Context, config: &PoseOptimizerConfig) -> usize {
+        let sensor = &context.sensor;
         self.observations.clear();
         self.observed.clear();
         for (i, matched) in self.matches.iter().enumerate() {
