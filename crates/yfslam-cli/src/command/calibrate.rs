@@ -31,9 +31,9 @@ Recording:
 
 Method:
   The recording is tracked several times. Each time, the readout time is estimated from the reprojection errors that grow with the row and
-  with the velocity, and is used for the next time, until estimate and value in use agree. With depth images, delays from -20 to 20 ms
-  between colour and depth are tried then; the one is chosen with which the measured depths agree best with the map, or 0 if none is
-  clearly better. Values of the shutter in the camera file are ignored, except depth_readout_ms.
+  with the velocity, and the estimate is used for the next time, until both agree. With depth images, delays from -20 to 20 ms between
+  colour and depth are then tried, and a parabola is fitted to the residuals of depth. Its minimum is the delay, or 0 if it is not clearly
+  lower than without a delay. The readout_ms of the camera file is ignored, and its depth_delay_ms is replaced.
 
 Camera file:
   All values of the camera with readout_ms, 0 for a global shutter, and depth_delay_ms. Without -o it is printed, with the tables as

@@ -82,7 +82,7 @@ impl Calibrator<'_> {
         let mut given_ms = None;
         for number in 1..=MAX_PASSES {
             let readout = self.pass(&format!("readout, pass {number}"), |camera| {
-                (camera.readout_ms, camera.depth_delay_ms) = (given_ms, None);
+                camera.readout_ms = given_ms;
             })?;
             let converged =
                 readout.estimate_ms.zip(given_ms).is_some_and(|(now, used)| (now - used).abs() < CONVERGED_MS);
