@@ -120,7 +120,9 @@ fn the_printed_configuration_can_be_read_again() {
 fn help_lists_every_command_and_completions_exist_for_every_shell() {
     let folder = tempfile::tempdir().unwrap();
     let help = succeeds(folder.path(), &["--help"]).stdout;
-    for command in ["run", "eval", "ape", "rpe", "demo", "detect", "synth", "bench", "info", "config", "completions"] {
+    for command in
+        ["run", "eval", "ape", "rpe", "demo", "detect", "synth", "bench", "calibrate", "info", "config", "completions"]
+    {
         assert!(help.contains(&format!("  {command} ")), "{help}");
         let own = succeeds(folder.path(), &[command, "--help"]).stdout;
         assert!(own.contains("Examples:"), "{own}");

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{bench, completions, config, demo, detect, eval, evo, info, map, run, synth};
+use crate::command::{bench, calibrate, completions, config, demo, detect, eval, evo, info, map, run, synth};
 use crate::input::detector::describe_embedded;
 use crate::ui::verbosity::Verbosity;
 
@@ -42,6 +42,7 @@ pub enum Command {
     Detect(detect::DetectArgs),
     Synth(synth::SynthArgs),
     Bench(bench::BenchArgs),
+    Calibrate(Box<calibrate::CalibrateArgs>),
     Info(info::InfoArgs),
     Config(config::ConfigArgs),
     Completions(completions::CompletionsArgs),

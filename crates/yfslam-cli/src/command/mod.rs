@@ -1,6 +1,7 @@
 //! One file per subcommand.
 
 pub mod bench;
+pub mod calibrate;
 pub mod cli;
 pub mod completions;
 pub mod config;
@@ -35,6 +36,7 @@ pub fn run(cli: &Cli) -> Result<()> {
         Command::Detect(args) => detect::run(args, terminal),
         Command::Bench(args) => bench::run(args, terminal),
         Command::Synth(args) => synth::run(args, terminal),
+        Command::Calibrate(args) => calibrate::run(args, terminal),
         Command::Info(args) => info::run(args),
         Command::Config(args) => config::run(args),
         Command::Completions(args) => completions::run(args, Cli::command()),

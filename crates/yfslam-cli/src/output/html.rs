@@ -104,6 +104,7 @@ fn facts(run: &ReportedRun, boxes: &BoxOrigin) -> Vec<(&'static str, String)> {
         ("Faults injected", faults),
         ("Frames", format!("{} in {seconds:.1} s", stamps.len())),
         ("Camera", format!("{width} × {height} px, {}", camera.origin)),
+        ("Readout of the rows", run.result.outcome.readout.to_string()),
         ("Boxes", boxes.to_string()),
         ("Ground truth", run.truth.map_or("none".to_owned(), |truth| truth.origin.clone())),
     ];

@@ -12,6 +12,7 @@ use crate::input::source::{MaskTally, Source, Truth};
 use crate::run::dense::DenseCost;
 use crate::run::method_run::RunResult;
 use crate::stats::process::FrameCost;
+use crate::stats::readout::ReadoutReport;
 use crate::stats::recognition::RecognitionTally;
 use crate::stats::stages::Stages;
 use crate::stats::tally::{DynamicTally, FrameTally};
@@ -41,6 +42,8 @@ pub struct RunReport<'a> {
     pub sequence: &'a str,
     pub camera_origin: &'a str,
     pub camera: &'a Camera,
+    /// The readout time of the rows that was in use, and its estimate.
+    pub readout: ReadoutReport,
     /// Where the boxes of movable objects come from.
     pub boxes: &'a BoxOrigin,
     /// Which frames had a mask, where masks were asked for.
@@ -108,6 +111,7 @@ impl<'a> RunReport<'a> {
             sequence,
             camera_origin: &source.camera.origin,
             camera: &source.camera.camera,
+            readout: outcome.readout,
             boxes,
             masks: source.masks.as_ref(),
             faults: faults.iter().map(ToString::to_string).collect(),

@@ -58,6 +58,9 @@ pub fn of_one(report: &RunReport, run: &ReportedRun) -> Result<String> {
             frames.detector_failures
         )?;
     }
+    if outcome.readout.is_noteworthy() {
+        writeln!(text, "rolling shutter: {}", outcome.readout)?;
+    }
     write_recognition(&mut text, &outcome.recognition)?;
     if let Some(time) = processor_time(std::slice::from_ref(run)) {
         text += &describe_processor_time(&time);

@@ -1,5 +1,6 @@
 //! SLAM on a sequence, and its evaluation.
 
+pub mod calibration;
 pub mod cost;
 pub mod dense;
 pub mod evaluation;

@@ -16,6 +16,7 @@ use super::dense::{DenseCost, DenseResult};
 use crate::input::detector::DetectorTime;
 use crate::stats::cpu;
 use crate::stats::process::{Part, Parts};
+use crate::stats::readout::ReadoutReport;
 use crate::stats::recognition::RecognitionTally;
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
@@ -55,6 +56,8 @@ pub struct Outcome {
     pub frames: FrameTally,
     pub dynamic: DynamicTally,
     pub recognition: RecognitionTally,
+    /// How the readout time of the rows was known at the end.
+    pub readout: ReadoutReport,
     pub stages: Stages,
     /// From the first frame to the last.
     pub wall: Duration,
@@ -254,6 +257,7 @@ impl Pipeline {
             frames: self.frames,
             dynamic: self.dynamic,
             recognition: self.recognition,
+            readout: self.slam.statistics().readout.into(),
             stages: self.stages,
             wall,
             parts: self.parts,

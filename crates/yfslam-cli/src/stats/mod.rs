@@ -2,6 +2,7 @@
 
 pub mod cpu;
 pub mod process;
+pub mod readout;
 pub mod recognition;
 pub mod skip;
 pub mod stages;

@@ -1,8 +1,9 @@
-//! Loads a camera calibration from a preset, a settings file in the style of ORB-SLAM2 and 3, or a TOML file.
+//! Loads a camera calibration from a preset, a settings file in the style of ORB-SLAM2 and 3, or a TOML file, and writes the latter.
 
 mod check;
 mod opencv;
 mod presets;
+mod write;
 
 use std::path::{Path, PathBuf};
 
@@ -14,6 +15,7 @@ use crate::text::read_text;
 pub use check::check_camera;
 pub use opencv::parse_opencv_settings;
 pub use presets::{PRESETS, preset};
+pub use write::{camera_toml, write_camera};
 
 /// Names of camera files in a sequence folder, in the order in which they are tried.
 const CAMERA_FILES: [&str; 3] = ["camera.toml", "camera.yaml", "camera.yml"];

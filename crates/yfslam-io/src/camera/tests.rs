@@ -102,6 +102,19 @@ fn toml_with_unknown_or_missing_keys_is_refused_with_the_line() {
 }
 
 #[test]
+fn a_written_camera_is_read_back_whatever_its_comment() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("camera.toml");
+    let mut camera = preset("bonn").unwrap().camera.with_fps(29.97).with_bf(41.5);
+    (camera.readout_ms, camera.depth_delay_ms) = (Some(-24.7), Some(0.0));
+    write_camera(&path, &camera, 5208.0, "made by hand\r\nfx = \u{7}\n\nlast line").unwrap();
+    let source = load_camera(path.to_str().unwrap(), None).unwrap();
+    assert_eq!((source.camera, source.depth_factor), (camera, 5208.0));
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.starts_with("# made by hand\n# fx =\n#\n# last line\nwidth = 640\n"), "{text}");
+}
+
+#[test]
 fn a_camera_is_loaded_by_path_or_from_the_folder_or_refused_with_the_names_of_the_presets() {
     let folder = tempfile::tempdir().unwrap();
     let error = detect_camera(folder.path()).unwrap_err().to_string();

@@ -14,6 +14,7 @@ use yfslam::{Camera, Frame, Image};
 use super::png::{encode_color, encode_depth, encode_mask};
 use crate::atomic_file::{MovedAside, Temporary, prepare_folder};
 use crate::boxes::{BOXES_FILE, BoxList};
+use crate::camera::camera_toml;
 use crate::error::{Error, Result};
 use crate::time::format_stamp;
 use crate::trajectory::{StampedPose, write_trajectory};
@@ -123,9 +124,7 @@ impl RecordingWriter {
         if !self.stereo {
             self.write_text("associations.txt", pairs)?;
         }
-        let camera = toml::to_string(camera)
-            .map_err(|error| Error::write(&self.target.join("camera.toml"), io::Error::other(error)))?;
-        self.write_text("camera.toml", &format!("{camera}depth_factor = {depth_factor:?}\n"))?;
+        self.write_file("camera.toml", |file| file.write_all(camera_toml(camera, depth_factor, "")?.as_bytes()))?;
         write_trajectory(&self.temporary.path().join("groundtruth.txt"), truth)?;
         boxes.write(&self.temporary.path().join(BOXES_FILE))?;
         let Self { temporary, target, replace, .. } = self;

@@ -50,7 +50,7 @@ pub struct Source {
 }
 
 /// Turns the shutter of a camera around: when time runs backward, the row that was read last comes first.
-fn reverse_readout(camera: &mut Camera) {
+pub fn reverse_readout(camera: &mut Camera) {
     for ms in [&mut camera.readout_ms, &mut camera.depth_readout_ms, &mut camera.depth_delay_ms] {
         // Not the negative value, which would make -0 of 0.
         *ms = ms.map(|ms| 0.0 - ms);
