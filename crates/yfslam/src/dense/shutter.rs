@@ -143,3 +143,73 @@ fn shift_at(
     let (in_depth, deeper_m) = seen_at(&|row| times.depth_seconds(row));
     Shift { color, depth: in_depth, deeper_m }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::se3_exp;
+    use nalgebra::Point3;
+
+    /// Renders a wall 2 m ahead with a pattern, each row at its time; returns colour and depth.
+    fn rolling_wall(camera: &Camera, times: &FrameTimes, velocity: &Velocity) -> (RgbImage, DepthImage) {
+        let mut color = Image::new(camera.width, camera.height);
+        let mut depth = DepthImage { raw: Image::new(camera.width, camera.height), metres_per_unit: 0.0002 };
+        for y in 0..camera.height {
+            for (seconds, is_color) in [(times.color.seconds(y as f64), true), (times.depth_seconds(y as f64), false)] {
+                let t_world_cam = se3_exp(&(velocity * seconds));
+                for x in 0..camera.width {
+                    let [ray_x, ray_y] = camera.undistort(x as f64, y as f64);
+                    let (from, to) = (t_world_cam * Point3::origin(), t_world_cam * Point3::new(ray_x, ray_y, 1.0));
+                    let z = (2.0 - from.z) / (to.z - from.z);
+                    let hit = from + (to - from) * z;
+                    if is_color {
+                        color.row_mut(y)[x] = pattern(&hit);
+                    } else {
+                        depth.raw.row_mut(y)[x] = (z * 5000.0).round() as u16;
+                    }
+                }
+            }
+        }
+        (color, depth)
+    }
+
+    fn pattern(p: &Point3<f64>) -> [u8; 3] {
+        [p.x, p.y, p.x + p.y].map(|v| (127.0 + 100.0 * (4.0 * v).sin()) as u8)
+    }
+
+    #[test]
+    fn the_corrected_images_are_those_of_a_global_shutter() {
+        let mut camera =
+            Camera::pinhole(320, 240, 260.0, 260.0, 160.0, 120.0).with_distortion([0.1, -0.2, 0.0, 0.0, 0.0]);
+        (camera.readout_ms, camera.depth_delay_ms) = (Some(30.0), Some(5.0));
+        let times = FrameTimes::new(&camera);
+        let velocity = Velocity::new(0.3, -0.2, 0.4, 0.3, 1.0, 0.5);
+        let (color, depth) = rolling_wall(&camera, &times, &velocity);
+        let (global_color, global_depth) = rolling_wall(&camera, &FrameTimes::default(), &velocity);
+        let shift = RowShift::new(&camera, &times, &velocity, &depth).unwrap();
+        let (corrected, corrected_depth) = (shift.corrected_color(&color), shift.corrected_depth(&depth));
+        let (mut before, mut after, mut before_m, mut after_m) = (0.0, 0.0, 0.0, 0.0);
+        for y in 16..224 {
+            for x in 16..304 {
+                let difference = |image: &RgbImage| -> f64 {
+                    let (a, b) = (image.get(x, y).unwrap(), global_color.get(x, y).unwrap());
+                    a.iter().zip(b).map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs()).sum()
+                };
+                let deeper =
+                    |image: &DepthImage| f64::from(image.metres(x, y).unwrap() - global_depth.metres(x, y).unwrap());
+                (before, after) = (before + difference(&color), after + difference(&corrected));
+                (before_m, after_m) = (before_m + deeper(&depth).abs(), after_m + deeper(&corrected_depth).abs());
+            }
+        }
+        assert!(after < 0.2 * before, "colour: {after} after, {before} before");
+        assert!(after_m < 0.1 * before_m, "depth: {after_m} after, {before_m} before");
+    }
+
+    #[test]
+    fn the_images_of_one_instant_are_not_touched() {
+        let camera = Camera::pinhole(320, 240, 260.0, 260.0, 160.0, 120.0);
+        let velocity = Velocity::new(0.3, -0.2, 0.4, 0.3, 1.0, 0.5);
+        let (_, depth) = rolling_wall(&camera, &FrameTimes::default(), &velocity);
+        assert!(RowShift::new(&camera, &FrameTimes::new(&camera), &velocity, &depth).is_none());
+    }
+}

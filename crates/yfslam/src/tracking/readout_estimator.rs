@@ -178,3 +178,66 @@ fn refine(
     }
     sums
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::config::Config;
+    use crate::geometry::se3_exp;
+
+    /// Pairs of a camera with that readout time, seen without noise, each with other velocities.
+    fn estimate_of(readout_s: f64, pairs: usize) -> ReadoutEstimate {
+        let camera = Camera::pinhole(640, 480, 520.0, 520.0, 320.0, 240.0);
+        let context = Context::new(&camera, &Config::default(), &[1.0]);
+        let pinhole = context.sensor.pinhole;
+        let mut estimator = ReadoutEstimator::default();
+        let mut keys = slotmap::SlotMap::<KeyFrameId, ()>::with_key();
+        for pair in 0..pairs {
+            let phase = pair as f64;
+            let velocity = |shift: f64| Vector6::from_fn(|i, _| ((i + 1) as f64 * phase + shift).sin());
+            let (of_keyframe, of_frame) = (velocity(0.3), velocity(1.7));
+            let motion = se3_exp(&(velocity(2.9) * 0.05));
+            let points: Vec<PairPoint> = (0..80)
+                .map(|i| {
+                    let [u, v, z] =
+                        [f64::from(i * 37 % 600) + 20.0, f64::from(i * 53 % 440) + 20.0, 1.0 + f64::from(i % 7) * 0.3];
+                    let point = pinhole.unproject(u, v, z).coords;
+                    let row_motion = motion_of(&point, &of_keyframe) * (v / 479.0 - 0.5);
+                    let at_zero = (motion * nalgebra::Point3::from(point + row_motion * readout_s)).coords;
+                    // The row in which the frame shows the point, by iteration.
+                    let mut seen = at_zero;
+                    for _ in 0..20 {
+                        let row = pinhole.project(&seen)[1] / 479.0 - 0.5;
+                        seen = at_zero - motion_of(&at_zero, &of_frame) * (row * readout_s);
+                    }
+                    let [u, v] = pinhole.project(&seen);
+                    let measurement = Measurement { u, v, weight_px: 1.0, ..Measurement::default() };
+                    PairPoint { point, row_motion, row: v / 479.0 - 0.5, measurement }
+                })
+                .collect();
+            let sums = refine(&context, &points, motion, &of_frame, 0.0).unwrap();
+            estimator.keyframes.push((keys.insert(()), sums));
+        }
+        estimator.estimate().unwrap()
+    }
+
+    #[test]
+    fn the_readout_time_of_exact_pairs_is_found() {
+        for readout_s in [-0.03, 0.0, 0.015, 0.033] {
+            let estimate = estimate_of(readout_s, 8);
+            assert!((estimate.readout_s - readout_s).abs() < 5e-4, "{estimate:?} instead of {readout_s}");
+            assert_eq!(estimate.keyframes, 8);
+        }
+    }
+
+    #[test]
+    fn two_keyframes_give_no_estimate() {
+        let mut estimator = ReadoutEstimator::default();
+        let mut keys = slotmap::SlotMap::<KeyFrameId, ()>::with_key();
+        for _ in 0..2 {
+            estimator.keyframes.push((keys.insert(()), Sums { information: 1.0, evidence: 0.02 }));
+            assert_eq!(estimator.estimate(), None);
+        }
+    }
+}
