@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use yfslam_io::{CameraSource, load_camera};
 
 /// A camera that turns; its calibration does not mention its readout time.
-const TURNING: &str = "walking_rpy?people=0&width=320&height=240&frames=150&unknown_readout=on&readout=";
+const TURNING: &str = "walking_rpy?people=0&width=320&height=240&frames=200&unknown_readout=on&readout=";
 
 /// The readout time of the rolling shutter, ms.
 const ROLLING_MS: f64 = 25.0;
@@ -56,7 +56,7 @@ fn a_rolling_shutter_is_found_within_2_ms_and_its_camera_file_is_used_by_a_run()
     assert!((readout_ms - ROLLING_MS).abs() < 2.0, "{readout_ms}");
     assert_eq!((source.camera.width, source.camera.depth_delay_ms), (320, None));
     let text = fs::read_to_string(folder.join("found.toml")).unwrap();
-    assert!(text.starts_with("# rolling/camera.toml, ") && text.contains("150 frames of rolling"), "{text}");
+    assert!(text.starts_with("# rolling/camera.toml, ") && text.contains("200 frames of rolling"), "{text}");
     let run = succeeds(folder, &["run", "rolling", "--camera", "found.toml", "--end", "20", "-o", "run"]);
     assert!(run.stdout.contains(&format!("rolling shutter: {readout_ms:.1} ms (from the camera file)")), "{run:?}");
     let readout = &report(&folder.join("run"))["readout"];
@@ -82,15 +82,16 @@ fn a_global_shutter_without_delay_is_written_as_0_and_without_a_file_the_camera_
         return;
     }
     fs::write(folder.path().join("printed.toml"), &output.stdout).unwrap();
+    assert!(
+        output.stdout.contains("# delay of depth (ms)") && output.stdout.contains("# global shutter"),
+        "{output:?}"
+    );
     let camera = load_camera(folder.path().join("printed.toml").to_str().unwrap(), None).unwrap().camera;
     assert_eq!((camera.readout_ms, camera.depth_delay_ms), (Some(0.0), Some(0.0)));
-    let again = succeeds(folder.path(), &[&args[..], &["--camera", "printed.toml", "-o", "again.toml"]].concat());
+    let again =
+        succeeds(folder.path(), &[&args[..], &["--camera", "printed.toml", "--no-delay", "-o", "again.toml"]].concat());
     assert!(again.stderr.contains("the readout time in printed.toml is ignored"), "{}", again.stderr);
-    assert!(
-        again.stdout.contains("global shutter") && again.stdout.contains("delay of depth (ms)"),
-        "{}",
-        again.stdout
-    );
+    assert!(again.stdout.contains("global shutter"), "{}", again.stdout);
 }
 
 #[test]

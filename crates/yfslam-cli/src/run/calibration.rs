@@ -23,6 +23,9 @@ use crate::ui::terminal::Terminal;
 const MAX_PASSES: usize = 5;
 /// Change of the estimate below which it has converged, ms.
 const CONVERGED_MS: f64 = 0.3;
+/// Standard deviation up to which an estimate counts as certain, ms, unless the configuration admits a larger one. It is larger than that of a
+/// run, whose estimate has to be final after the first seconds.
+const MAX_SIGMA_MS: f64 = 2.0;
 /// Standard deviations from which a value is different from 0.
 const CLEAR_SIGMAS: f64 = 3.0;
 /// Delays are tried up to this one, in both directions, ms: more than half of the time between two images of most cameras.
@@ -88,7 +91,12 @@ impl Calibrator<'_> {
                 readout.estimate_ms.zip(given_ms).is_some_and(|(now, used)| (now - used).abs() < CONVERGED_MS);
             passes.push(ReadoutPass { given_ms, readout });
             let Some(next_ms) = readout.estimate_ms.filter(|_| !converged) else { break };
-            given_ms = Some(next_ms.clamp(-self.frame_ms, self.frame_ms));
+            let next_ms = Some(next_ms.clamp(-self.frame_ms, self.frame_ms));
+            // The same value would give the same estimate again.
+            if next_ms == given_ms {
+                break;
+            }
+            given_ms = next_ms;
         }
         Ok(passes)
     }
@@ -118,6 +126,7 @@ impl Calibrator<'_> {
         let mut config = self.config.clone();
         config.depth.source = source.depth_source;
         config.tracking.estimate_readout = ReadoutEstimation::Always;
+        config.tracking.readout_max_sigma_ms = config.tracking.readout_max_sigma_ms.max(MAX_SIGMA_MS);
         let detector = match self.boxes {
             BoxOrigin::Detector(_) => Some(load_for(self.detector, &config)?),
             _ => None,
