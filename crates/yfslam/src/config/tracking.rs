@@ -93,7 +93,7 @@ config_section! {
         /// The standard deviation of the estimated readout time up to which it is final. Before, an estimate of five standard deviations is
         /// used for the time being, because it is nearer to the truth than a global shutter.
         /// Source: chosen: an error of 2 ms takes a tenth of the gain.
-        readout_max_sigma_ms: f64 = 1.5, in 0.0..=100.0, "ms";
+        readout_max_sigma_ms: f64 = 2.0, in 0.0..=100.0, "ms";
         /// The estimated readout time below which the shutter is taken for global.
         /// Source: chosen: no rolling shutter in use is faster.
         readout_min_ms: f64 = 3.0, in 0.0..=100.0, "ms";

@@ -7,8 +7,14 @@ use crate::tracking::ReadoutEstimator;
 /// Estimates that follow each other: each is made with the poses that the one before has corrected.
 const ROUNDS: usize = 3;
 
+/// Keyframes that the first estimate needs: it is used for the time being, and replaced.
+const FIRST_KEYFRAMES: usize = 4;
+
 /// Standard deviations by which a readout time differs from that of a global shutter.
-const ROLLING_SIGMAS: f64 = 5.0;
+const ROLLING_SIGMAS: f64 = 4.0;
+
+/// Standard deviations within which it is that of a global shutter.
+const GLOBAL_SIGMAS: f64 = 2.0;
 
 /// How the readout time of the rows of an image is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -68,34 +74,53 @@ impl Slam {
         let config = &self.context.config.tracking;
         let Some(estimate) = search.estimator.estimate() else { return Some(search) };
         let (readout_ms, sigma_ms) = (1e3 * estimate.readout_s, 1e3 * estimate.sigma_s);
-        self.readout.estimate_ms = Some(readout_ms);
-        self.readout.sigma_ms = Some(sigma_ms);
         let camera = &self.context.sensor.camera;
-        let is_possible = readout_ms.abs() <= 1e3 / camera.fps;
+        // A sensor reads its rows in no more than the time between two frames.
+        let longest_ms = 1e3 / camera.fps;
+        let is_possible = readout_ms.abs() <= longest_ms + 3.0 * sigma_ms;
+        let readout_ms = readout_ms.clamp(-longest_ms, longest_ms);
         let is_precise = sigma_ms <= config.readout_max_sigma_ms;
         let is_rolling = readout_ms.abs() >= config.readout_min_ms.max(ROLLING_SIGMAS * sigma_ms);
-        self.readout.is_certain = estimate.keyframes >= config.readout_min_keyframes && is_precise && is_possible;
-        if self.readout.from_camera || estimate.keyframes < config.readout_min_keyframes {
+        let is_certain = estimate.keyframes >= config.readout_min_keyframes && is_precise && is_possible;
+        // The report belongs to the value in use, not to a later estimate that is still under way.
+        if search.round == 0 || is_certain {
+            self.readout.estimate_ms = Some(readout_ms);
+            self.readout.sigma_ms = Some(sigma_ms);
+            self.readout.is_certain = is_certain;
+        }
+        let needed = if search.round == 0 { FIRST_KEYFRAMES } else { config.readout_min_keyframes };
+        if self.readout.from_camera || estimate.keyframes < needed {
             return Some(search);
         }
-        match (is_precise, is_rolling && is_possible) {
-            (true, true) => {}
+        match (is_certain, is_rolling && is_possible) {
+            (true, true) => self.use_readout(readout_ms),
             // At first, a rough value is better than none.
-            (false, true) if search.round == 0 => {}
+            (false, true) if search.round == 0 => self.use_readout(readout_ms),
             (false, _) => return Some(search),
+            (true, false) if readout_ms.abs() >= GLOBAL_SIGMAS * sigma_ms => return Some(search),
             // A global shutter, or something that the model does not describe: the images are used as they are.
-            (true, false) => return None,
+            (true, false) => {
+                if search.round > 0 {
+                    self.use_readout(0.0);
+                }
+                return None;
+            }
         }
-        self.readout.in_use_ms = readout_ms;
+        search.round += 1;
+        search.estimator = ReadoutEstimator::default();
+        (search.round < ROUNDS).then_some(search)
+    }
+
+    /// Uses a readout time from now on, and corrects the map for it.
+    fn use_readout(&mut self, readout_ms: f64) {
+        let camera = &self.context.sensor.camera;
         let color = RowTimes::new(camera, readout_ms);
         let depth = camera.depth_readout_ms.map_or(color, |ms| RowTimes::new(camera, ms));
+        self.readout.in_use_ms = readout_ms;
         self.frame_times = FrameTimes { color, depth, ..self.frame_times };
         self.tracker.set_row_times(&self.frame_times);
         if !self.is_map_frozen() {
             self.owner.set_row_times(&self.frame_times);
         }
-        search.round += 1;
-        search.estimator = ReadoutEstimator::default();
-        (search.round < ROUNDS).then_some(search)
     }
 }
