@@ -30,7 +30,8 @@ pub fn preset(name: &str) -> Option<CameraSource> {
         }
         _ => return None,
     };
-    // Fitted by `yfslam calibrate`; the others are estimated in each run.
+    // Estimated on a recording of each sensor, without its ground truth: 25.8 ± 1.8 ms, and 26 to 33 ms. Those of the other sensors are
+    // estimated in each run.
     let readout_ms = match &*name {
         "tum1" => Some(25.0),
         "bonn" => Some(30.0),

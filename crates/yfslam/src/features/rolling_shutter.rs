@@ -28,6 +28,11 @@ impl RowTimes {
         Self { middle_row: 0.5 * last_row, seconds_per_row: readout_ms * 1e-3 / last_row }
     }
 
+    /// Returns the time from the first to the last row, s, whatever their order.
+    fn readout_s(&self) -> f64 {
+        2.0 * self.middle_row * self.seconds_per_row.abs()
+    }
+
     /// Returns when a row of the distorted image is read, s after the middle row.
     #[inline]
     pub(crate) fn seconds(&self, row: f64) -> f64 {
@@ -65,6 +70,11 @@ impl FrameTimes {
     /// Returns whether colour and depth show one instant.
     pub(crate) fn is_instant(&self) -> bool {
         self.color.seconds_per_row == 0.0 && self.depth.seconds_per_row == 0.0 && self.depth_delay_s == 0.0
+    }
+
+    /// Returns the longer of the two readout times, s.
+    pub(crate) fn longest_readout_s(&self) -> f64 {
+        self.color.readout_s().max(self.depth.readout_s())
     }
 
     /// Returns whether depth is read at the same time as the colour of the same pixel.

@@ -30,6 +30,9 @@ pub(crate) use tracked_frame::{Match, TrackedFrame};
 pub(crate) use two_view_initialiser::{StartFrame, TwoViewInitialiser, TwoViewMap};
 use visibility_check::is_free_space;
 
+/// Least time between two frames from which a velocity is measured, as a share of the readout time.
+const MIN_READOUT_SHARE: f64 = 0.6;
+
 /// Landmarks that were expected in view, matched, or contradicted by the depth image in recent frames; an id may occur several times.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ObservationCounts {
@@ -132,7 +135,10 @@ impl Tracker {
         let seconds = (self.current.timestamp_ns - self.last.timestamp_ns) as f64 * 1e-9;
         let max_gap_s = context.config.tracking.max_gap_s;
         let (last, current) = (&self.last.t_cam_world, &self.current.t_cam_world);
-        Interval::between(last, current, seconds, max_gap_s).filter(|_| self.last_is_tracked)
+        // No sensor reads two images at once. Over so short a time the errors of the poses would make a velocity that the correction
+        // of the next poses makes still worse.
+        let is_long_enough = seconds >= MIN_READOUT_SHARE * self.current.features.times().longest_readout_s();
+        Interval::between(last, current, seconds, max_gap_s).filter(|_| self.last_is_tracked && is_long_enough)
     }
 
     /// Velocity of the current frame, from its pose and the last two.

@@ -35,3 +35,28 @@ impl Interval {
         self.mean
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::se3_exp;
+
+    #[test]
+    fn velocities_of_an_accelerated_camera_are_found_at_the_frames() {
+        let rate = Velocity::new(0.2, -0.1, 0.3, 0.0, 0.0, 0.0);
+        // Position = rate · t², so the velocity is 2 · rate · t.
+        let pose = |t: f64| se3_exp(&(rate * (t * t))).inverse();
+        let between = |a: f64, b: f64| Interval::between(&pose(a), &pose(b), b - a, 0.5).unwrap();
+        let (first, second) = (between(0.0, 0.03), between(0.03, 0.08));
+        assert!((first.at_joint(&second) - rate * 0.06).norm() < 1e-9);
+        assert!((second.at_end(Some(&first)) - rate * 0.16).norm() < 1e-9);
+        assert!((second.at_end(None) - rate * 0.11).norm() < 1e-9);
+    }
+
+    #[test]
+    fn no_velocity_follows_from_a_gap_or_from_no_time() {
+        let pose = Pose::translation(0.1, 0.0, 0.0);
+        assert!(Interval::between(&Pose::identity(), &pose, 0.6, 0.5).is_none());
+        assert!(Interval::between(&Pose::identity(), &pose, 0.0, 0.5).is_none());
+    }
+}
