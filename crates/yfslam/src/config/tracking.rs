@@ -90,8 +90,8 @@ config_section! {
         /// The number of keyframes with which frames must have been compared before the estimated readout time is used.
         /// Source: chosen: with fewer, their scatter does not tell the standard deviation.
         readout_min_keyframes: usize = 6, in 3..=10_000, "keyframes";
-        /// The standard deviation of the estimated readout time up to which it is final. Before, an estimate of five standard deviations is
-        /// used for the time being, because it is nearer to the truth than a global shutter.
+        /// The standard deviation of the estimated readout time up to which it is final; above it, a first estimate of more than four
+        /// standard deviations is used for the time being.
         /// Source: chosen: an error of 2 ms takes a tenth of the gain.
         readout_max_sigma_ms: f64 = 2.0, in 0.0..=100.0, "ms";
         /// The estimated readout time below which the shutter is taken for global.

@@ -107,7 +107,7 @@ impl Slam {
             }
         }
         search.round += 1;
-        search.estimator = ReadoutEstimator::default();
+        search.estimator.clear();
         (search.round < ROUNDS).then_some(search)
     }
 

@@ -18,6 +18,10 @@ const MIN_POINTS: usize = 40;
 /// Factor on the standard deviation that the scatter gives: on 30 runs in rendered worlds the errors were twice as large as the scatter said,
 /// because the errors of velocities are common to neighbouring keyframes.
 const SCATTER_FACTOR: f64 = 1.5;
+/// Keyframes for which memory is reserved, so that a frame allocates none.
+const KEYFRAMES: usize = 256;
+/// Points for which memory is reserved.
+const POINTS: usize = 2048;
 /// Steps of the refinement of each pair.
 const STEPS: usize = 3;
 /// Least time between a frame and its keyframe, ns: before, the errors of both are nearly the same and cancel.
@@ -42,7 +46,7 @@ pub(crate) struct ReadoutEstimate {
 }
 
 /// Collects what pairs of frames say about the readout time.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct ReadoutEstimator {
     /// For each keyframe in the order of time.
     keyframes: Vec<(KeyFrameId, Sums)>,
@@ -62,7 +66,19 @@ struct PairPoint {
     measurement: Measurement,
 }
 
+impl Default for ReadoutEstimator {
+    fn default() -> Self {
+        // A recording of some minutes compares with so many keyframes; no frame has so many points.
+        Self { keyframes: Vec::with_capacity(KEYFRAMES), points: Vec::with_capacity(POINTS) }
+    }
+}
+
 impl ReadoutEstimator {
+    /// Forgets all pairs.
+    pub(crate) fn clear(&mut self) {
+        self.keyframes.clear();
+    }
+
     /// Adds a tracked frame whose velocity is known from its neighbours.
     pub(crate) fn add(&mut self, context: &Context, map: &Map, reference: KeyFrameId, frame: &TrackedFrame) {
         let TrackedFrame { timestamp_ns, features, matches, t_cam_world, .. } = frame;

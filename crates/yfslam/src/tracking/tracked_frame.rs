@@ -123,6 +123,7 @@ impl TrackedFrame {
         let pose = &self.t_cam_world;
         let depth_of = |matched: &Match| (pose * matched.point_world).z;
         self.depths.clear();
+        self.depths.reserve(self.matches.len());
         self.depths.extend(self.matches.iter().flatten().map(depth_of));
         let middle = self.depths.len() / 2;
         let median = match self.depths.is_empty() {
