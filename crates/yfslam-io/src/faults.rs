@@ -142,9 +142,9 @@ impl FaultInjector {
                 FaultKind::Frozen => {
                     frozen = true;
                     let kept = self.frozen.get_or_insert_with(|| frame.clone());
-                    let timestamp_ns = frame.timestamp_ns;
+                    let stamps = (frame.timestamp_ns, frame.depth_timestamp_ns);
                     frame = kept.clone();
-                    frame.timestamp_ns = timestamp_ns;
+                    (frame.timestamp_ns, frame.depth_timestamp_ns) = stamps;
                 }
                 FaultKind::Blank => repaint(&mut frame, |_| [255; 3]),
                 FaultKind::Black => repaint(&mut frame, |_| [0; 3]),

@@ -7,8 +7,9 @@ fn frame(k: i64) -> Frame {
     let color = RgbImage::from_vec(4, 2, vec![[100 + k as u8; 3]; 8]).unwrap();
     let raw = Image::from_vec(4, 2, vec![1000 + k as u16; 8]).unwrap();
     let bbox = BoundingBox { x_min: k as f32, ..Default::default() };
-    Frame::rgbd(7_000_000_000 + k * 100_000_000, color, DepthImage { raw, metres_per_unit: 0.0002 })
-        .with_detections(vec![Detection { class: 0, score: 1.0, bbox }])
+    let mut frame = Frame::rgbd(7_000_000_000 + k * 100_000_000, color, DepthImage { raw, metres_per_unit: 0.0002 });
+    frame.depth_timestamp_ns = Some(frame.timestamp_ns + 5_000_000);
+    frame.with_detections(vec![Detection { class: 0, score: 1.0, bbox }])
 }
 
 /// Returns the deliveries of ten frames.
@@ -74,6 +75,8 @@ fn images_become_white_black_dark_or_frozen() {
     assert_eq!(frozen.iter().map(grey).collect::<Vec<_>>(), [100, 101, 102, 103, 103, 103, 106, 107, 108, 109]);
     assert_eq!(frozen.iter().map(depth).collect::<Vec<_>>()[3..7], [1003, 1003, 1003, 1006]);
     assert_eq!(frozen[5].frame.detections, frozen[3].frame.detections);
+    let depth_after = |one: &Delivery| one.frame.depth_timestamp_ns.unwrap() - one.frame.timestamp_ns;
+    assert!(frozen.iter().all(|one| depth_after(one) == 5_000_000), "the stamps of depth continue, too");
     assert_eq!(order(&frozen), (0..10).collect::<Vec<_>>());
 }
 

@@ -19,8 +19,8 @@ use crate::map::{KeyFrameId, Map};
 use crate::tracking::{ObservationCounts, TrackedFrame, TwoViewMap};
 use crate::worker::{Requests, Worker};
 
-/// Requests that can wait: a keyframe, an adjusted copy, and a few observation counts.
-const QUEUE: usize = 4;
+/// Requests that can wait: a keyframe, its velocity, the row times, an adjusted copy, and a few observation counts.
+const QUEUE: usize = 6;
 /// Observation counts that are sent together.
 const SEND_COUNTS_AT: usize = 4000;
 

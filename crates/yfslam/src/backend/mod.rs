@@ -119,6 +119,7 @@ impl Backend {
     fn reset(&mut self) {
         self.map = Map::default();
         self.mapper.reset();
+        self.latest = None;
         self.loops.reset();
         self.recogniser.lock().unwrap_or_else(PoisonError::into_inner).reset();
     }

@@ -87,15 +87,15 @@ config_section! {
         /// estimate beside the value of the camera is only reported.
         /// Source: chosen: few camera files tell it.
         estimate_readout: ReadoutEstimation = ReadoutEstimation::Unknown, any, "never, unknown, always";
-        /// The number of keyframes with which frames must have been compared before the estimated readout time is used.
+        /// The number of keyframes with which frames must have been compared before the estimated readout time is final.
         /// Source: chosen: with fewer, their scatter does not tell the standard deviation.
         readout_min_keyframes: usize = 6, in 3..=10_000, "keyframes";
         /// The standard deviation of the estimated readout time up to which it is final; above it, a first estimate of more than four
         /// standard deviations is used for the time being.
-        /// Source: chosen: an error of 2 ms takes a tenth of the gain.
+        /// Source: chosen: as much as the fits of one sensor to several recordings differ.
         readout_max_sigma_ms: f64 = 2.0, in 0.0..=100.0, "ms";
         /// The estimated readout time below which the shutter is taken for global.
-        /// Source: chosen: no rolling shutter in use is faster.
+        /// Source: chosen: about the standard deviation of an estimate from a few seconds.
         readout_min_ms: f64 = 3.0, in 0.0..=100.0, "ms";
     }
 }

@@ -1,12 +1,13 @@
 //! Images of a rolling shutter as a global shutter would have seen them while the middle row of the colour image was read.
 //!
 //! In: a frame, its row times, the velocity of the camera. Out: where each pixel of the corrected image lies in the images as they were
-//! read, and the corrected images. The shift is computed on a coarse grid and interpolated: it changes slowly over the image.
+//! read, and the corrected images. The shift is computed on a coarse grid and interpolated: it changes slowly over a surface, and patches
+//! leave out the edges of depth, where it does not.
 
 use nalgebra::Vector3;
 
 use crate::camera::Camera;
-use crate::features::rolling_shutter::{FrameTimes, Velocity, at_time_zero};
+use crate::features::rolling_shutter::{FrameTimes, Velocity, when_read};
 use crate::image::{DepthImage, Image, RgbImage};
 
 /// Distance of the points of the coarse grid, px.
@@ -126,18 +127,15 @@ fn shift_at(
     let ray = Vector3::new(ray_x, ray_y, 1.0);
     let own_m = depth.metres(x.min(camera.width - 1), y.min(camera.height - 1)).map_or(typical_m, f64::from);
     let point = ray * own_m;
-    let seen_at = |seconds_of_row: &dyn Fn(f64) -> f64| {
-        let mut at = [x as f64, y as f64];
-        let mut seen = point;
-        for _ in 0..2 {
-            seen = at_time_zero(&point, &-velocity, seconds_of_row(at[1]));
-            if seen.z > 0.0 {
-                at = camera.distort(seen.x / seen.z, seen.y / seen.z);
-            }
+    // The lens model does not return exactly to the pixel from which the ray came.
+    let [own_x, own_y] = camera.distort(ray_x, ray_y);
+    let seen_at = |seconds: &dyn Fn(f64) -> f64| {
+        let seen = when_read(&point, velocity, camera, seconds);
+        if seen.z <= 0.0 {
+            return ([0.0; 2], 0.0);
         }
-        // The lens model does not return exactly to the pixel from which the ray came.
-        let [own_x, own_y] = camera.distort(ray_x, ray_y);
-        ([(at[0] - own_x) as f32, (at[1] - own_y) as f32], (own_m - seen.z) as f32)
+        let [x, y] = camera.distort(seen.x / seen.z, seen.y / seen.z);
+        ([(x - own_x) as f32, (y - own_y) as f32], (own_m - seen.z) as f32)
     };
     let (color, _) = seen_at(&|row| times.color.seconds(row));
     let (in_depth, deeper_m) = seen_at(&|row| times.depth_seconds(row));

@@ -18,7 +18,7 @@ const GRID_ROWS: usize = 48;
 pub struct Feature {
     /// Position in the distorted image, px.
     pub raw: [f32; 2],
-    /// Undistorted column, px.
+    /// Undistorted column, px. With a rolling shutter, `u`, `v` and `depth_m` are those at the time of the middle row of the image.
     pub u: f32,
     /// Undistorted row, px.
     pub v: f32,
@@ -128,7 +128,7 @@ impl FrameFeatures {
         }
     }
 
-    /// Brings all features to the time of the middle row, for a camera with that velocity. `depth_of` a feature stands for a depth that
+    /// Notes the velocity of the camera, and brings all features to the time of the middle row. `depth_of` a feature stands for a depth that
     /// was not measured, m. The search grid stays as it is: after a small change of the velocity it is still right.
     pub(crate) fn move_to_middle_row(
         &mut self,
@@ -163,11 +163,6 @@ impl FrameFeatures {
     /// Sets how the rows of the colour image and of the depth image are read, once that is known.
     pub(crate) fn set_row_times(&mut self, times: &FrameTimes) {
         (self.times.color, self.times.depth) = (times.color, times.depth);
-    }
-
-    /// Notes the velocity of the camera without a correction.
-    pub(crate) fn set_velocity(&mut self, velocity: &Velocity) {
-        self.velocity = Some(*velocity);
     }
 
     /// The velocity to which the features were corrected last.

@@ -112,12 +112,13 @@ pub(crate) fn at_time_zero(point: &Vector3<f64>, velocity: &Velocity, seconds: f
     point + (rate + angular.cross(&rate) * (0.5 * seconds)) * seconds
 }
 
-/// Returns where a point of the camera frame at time 0 lies in the camera frame when the depth image reads its row.
-pub(crate) fn at_depth_time(
+/// Returns where a point of the camera frame at time 0 lies in the camera frame when an image reads its row; `seconds` is the time of a row
+/// of the distorted image.
+pub(crate) fn when_read(
     point: &Vector3<f64>,
-    times: &FrameTimes,
     velocity: &Velocity,
     camera: &Camera,
+    seconds: impl Fn(f64) -> f64,
 ) -> Vector3<f64> {
     let mut seen = *point;
     for _ in 0..2 {
@@ -125,7 +126,7 @@ pub(crate) fn at_depth_time(
             break;
         }
         let [_, row] = camera.distort(seen.x / seen.z, seen.y / seen.z);
-        seen = at_time_zero(point, &-velocity, times.depth_seconds(row));
+        seen = at_time_zero(point, &-velocity, seconds(row));
     }
     seen
 }
@@ -174,7 +175,7 @@ impl Measured {
         }
         let Some(first_guess) = self.depth_m else { return };
         let point = self.point(times, velocity, &Pinhole::from(camera), f64::from(first_guess));
-        let seen = at_depth_time(&point, times, velocity, camera);
+        let seen = when_read(&point, velocity, camera, |row| times.depth_seconds(row));
         if seen.z <= 0.0 {
             return;
         }

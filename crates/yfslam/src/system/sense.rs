@@ -151,8 +151,11 @@ impl Slam {
         if let (Some(stereo), Some(sparse)) = (&mut self.stereo, Arc::get_mut(&mut self.sparse_depth)) {
             stereo.finish(&self.extractor, &self.extracted, &mut current.features, sparse);
         }
-        let depth_after = measured.and(frame.depth_timestamp_ns).map_or(0, |ns| ns.saturating_sub(frame.timestamp_ns));
-        let times = self.frame_times.with_depth_after(depth_after as f64 * 1e-9);
+        let depth_ns = measured.and(frame.depth_timestamp_ns);
+        let depth_after_s = depth_ns.map(|ns| ns.saturating_sub(frame.timestamp_ns) as f64 * 1e-9);
+        // The velocity of the frame does not reach as far as the next one: such a depth image is used as it is.
+        let depth_after_s = depth_after_s.filter(|seconds| seconds.abs() * sensor.camera.fps <= 1.0);
+        let times = self.frame_times.with_depth_after(depth_after_s.unwrap_or(0.0));
         if !times.is_instant() || self.readout_search.is_some() {
             current.features.keep_measured(times);
         }

@@ -73,6 +73,10 @@ impl Slam {
     fn conclude(&mut self, mut search: ReadoutSearch) -> Option<ReadoutSearch> {
         let config = &self.context.config.tracking;
         let Some(estimate) = search.estimator.estimate() else { return Some(search) };
+        if search.estimator.is_full() && !self.readout.from_camera {
+            // The motion of this camera does not show it: no more time is spent on it.
+            return None;
+        }
         let (readout_ms, sigma_ms) = (1e3 * estimate.readout_s, 1e3 * estimate.sigma_s);
         let camera = &self.context.sensor.camera;
         // A sensor reads its rows in no more than the time between two frames.

@@ -125,6 +125,9 @@ impl Tracker {
         self.track_local_map(context, map, min_inliers)?;
         if self.correct_shutter(context, self.current_velocity(context), None) {
             self.inliers = self.current.polish_pose(context);
+            if self.inliers < min_inliers {
+                return Err(LostReason::TooFewInliers { found: self.inliers, needed: min_inliers });
+            }
         }
         self.correct_last(context, map);
         Ok(())

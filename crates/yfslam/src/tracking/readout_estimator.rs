@@ -18,14 +18,14 @@ const MIN_POINTS: usize = 40;
 /// Factor on the standard deviation that the scatter gives: on 30 runs in rendered worlds the errors were twice as large as the scatter said,
 /// because the errors of velocities are common to neighbouring keyframes.
 const SCATTER_FACTOR: f64 = 1.5;
-/// Keyframes for which memory is reserved, so that a frame allocates none.
+/// Most keyframes of an estimate. Their memory is reserved, so that a frame allocates none.
 const KEYFRAMES: usize = 256;
 /// Points for which memory is reserved.
 const POINTS: usize = 2048;
 /// Steps of the refinement of each pair.
 const STEPS: usize = 3;
 /// Least time between a frame and its keyframe, ns: before, the errors of both are nearly the same and cancel.
-const MIN_GAP_NS: i64 = 150_000_000;
+const MIN_GAP_NS: u64 = 150_000_000;
 
 /// Sums over the pairs with one keyframe: `information · readout = evidence`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -68,12 +68,16 @@ struct PairPoint {
 
 impl Default for ReadoutEstimator {
     fn default() -> Self {
-        // A recording of some minutes compares with so many keyframes; no frame has so many points.
         Self { keyframes: Vec::with_capacity(KEYFRAMES), points: Vec::with_capacity(POINTS) }
     }
 }
 
 impl ReadoutEstimator {
+    /// Returns whether it has seen as many keyframes as it can: more would hardly change the estimate.
+    pub(crate) fn is_full(&self) -> bool {
+        self.keyframes.len() >= KEYFRAMES
+    }
+
     /// Forgets all pairs.
     pub(crate) fn clear(&mut self) {
         self.keyframes.clear();
@@ -82,9 +86,9 @@ impl ReadoutEstimator {
     /// Adds a tracked frame whose velocity is known from its neighbours.
     pub(crate) fn add(&mut self, context: &Context, map: &Map, reference: KeyFrameId, frame: &TrackedFrame) {
         let TrackedFrame { timestamp_ns, features, matches, t_cam_world, .. } = frame;
-        let Some(keyframe) = map.keyframe(reference) else { return };
+        let Some(keyframe) = map.keyframe(reference).filter(|_| !self.is_full()) else { return };
         let (Some(of_frame), Some(of_keyframe)) = (features.velocity(), keyframe.features.velocity()) else { return };
-        if timestamp_ns.abs_diff(keyframe.timestamp_ns) < MIN_GAP_NS.unsigned_abs() {
+        if timestamp_ns.abs_diff(keyframe.timestamp_ns) < MIN_GAP_NS {
             return;
         }
         let sensor = &context.sensor;
@@ -154,7 +158,7 @@ fn refine(
     points: &[PairPoint],
     mut t_frame_keyframe: Pose,
     velocity: &Vector6<f64>,
-    mut readout_s: f64,
+    readout_s: f64,
 ) -> Option<Sums> {
     let pinhole = &context.sensor.pinhole;
     let mut sums = None;
@@ -189,11 +193,8 @@ fn refine(
         let gradient: Vector6<f64> = b.fixed_rows::<6>(0).into_owned();
         let reduced = b[6] - cross.dot(&solved.solve(&gradient));
         sums = Some(Sums { information, evidence: reduced + information * readout_s });
-        // A pair alone may say little about the readout time; then it is left as it is.
-        let step = 0.0;
-        readout_s += step;
-        let pose_step = solved.solve(&(gradient - cross * step));
-        t_frame_keyframe = perturbed(&pose_step, &t_frame_keyframe);
+        // A pair alone says little about the readout time, so only the pose is refined with it.
+        t_frame_keyframe = perturbed(&solved.solve(&gradient), &t_frame_keyframe);
     }
     sums
 }

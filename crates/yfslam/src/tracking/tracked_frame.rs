@@ -117,8 +117,8 @@ impl TrackedFrame {
             self.features.measure_depths(velocity, &sensor.camera, depth);
         }
         if self.features.times().is_instant() {
-            self.features.set_velocity(velocity);
-            return;
+            // Nothing moves; the velocity is noted for the estimate of the readout time.
+            return self.features.move_to_middle_row(velocity, &sensor.pinhole, |_| UNKNOWN_DEPTH_M);
         }
         let pose = &self.t_cam_world;
         let depth_of = |matched: &Match| (pose * matched.point_world).z;

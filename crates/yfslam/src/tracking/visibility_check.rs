@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::config::FullConfig;
 use crate::context::SensorModel;
-use crate::features::rolling_shutter::at_depth_time;
+use crate::features::rolling_shutter::when_read;
 use crate::image::DepthImage;
 use crate::tracking::tracked_frame::TrackedFrame;
 
@@ -24,7 +24,7 @@ pub(super) fn is_free_space(
 ) -> bool {
     let mut p: Vector3<f64> = (frame.t_cam_world * point_world).coords;
     if let Some(velocity) = frame.features.velocity().filter(|_| !frame.features.times().is_instant()) {
-        p = at_depth_time(&p, frame.features.times(), velocity, &sensor.camera);
+        p = when_read(&p, velocity, &sensor.camera, |row| frame.features.times().depth_seconds(row));
     }
     let min_depth_m = (1.0 + f64::from(config.free_space_margin_share)) * p.z + f64::from(config.free_space_margin_m);
     let (x, y) = (p.x / p.z, p.y / p.z);
