@@ -22,7 +22,8 @@ use crate::image::DepthImage;
 use crate::map::{KeyFrameId, KeyframeRelativePose, LandmarkId, Map};
 use keyframe_policy::{FrameSummary, is_keyframe_wanted};
 use local_map::LocalMap;
-use motion::Interval;
+use motion::{Interval, weighted};
+use nalgebra::Matrix6;
 pub(crate) use readout_estimator::ReadoutEstimator;
 use search::{search_keyframe, search_last_frame, search_local_map};
 pub use state::{LostReason, TrackingState};
@@ -65,6 +66,8 @@ pub(crate) struct Tracker {
     last_is_tracked: bool,
     /// Motion between the last two frames, if both poses are known.
     interval: Option<Interval>,
+    /// Covariance of the pose of the last frame.
+    last_covariance: Option<Matrix6<f64>>,
     /// Velocity of the last frame, with which it was corrected after the current one was tracked.
     pub last_velocity: Option<Velocity>,
     local_map: LocalMap,
@@ -108,7 +111,7 @@ impl Tracker {
         depth: &DepthImage,
         min_inliers: usize,
     ) -> Result<(), LostReason> {
-        if self.correct_shutter(context, self.interval.map(|interval| interval.mean()), None) {
+        if self.correct_shutter(context, self.last_known_velocity(), None) {
             self.current.features.build_grid();
         }
         if !self.estimate_first_pose(context, map) {
@@ -133,20 +136,43 @@ impl Tracker {
         Ok(())
     }
 
+    /// Time from the last frame to the current one, s.
+    fn seconds_since_last(&self) -> f64 {
+        (self.current.timestamp_ns - self.last.timestamp_ns) as f64 * 1e-9
+    }
+
     /// Motion from the last frame to the current one, if both poses are known.
     fn current_interval(&self, context: &Context) -> Option<Interval> {
-        let seconds = (self.current.timestamp_ns - self.last.timestamp_ns) as f64 * 1e-9;
         let max_gap_s = context.config.tracking.max_gap_s;
-        let (last, current) = (&self.last.t_cam_world, &self.current.t_cam_world);
+        let seconds = self.seconds_since_last();
+        let ((last, last_s), (current, current_s)) = (self.last.observed_pose(), self.current.observed_pose());
         // No sensor reads two images at once. Over so short a time the errors of the poses would make a velocity that the correction
         // of the next poses makes still worse.
         let is_long_enough = seconds >= MIN_READOUT_SHARE * self.current.features.times().longest_readout_s();
-        Interval::between(last, current, seconds, max_gap_s).filter(|_| self.last_is_tracked && is_long_enough)
+        Interval::between((&last, last_s - seconds), (&current, current_s), max_gap_s)
+            .filter(|_| self.last_is_tracked && is_long_enough)
     }
 
     /// Velocity of the current frame, from its pose and the last two.
     fn current_velocity(&self, context: &Context) -> Option<Velocity> {
-        Some(self.current_interval(context)?.at_end(self.interval.as_ref()))
+        let seconds = self.seconds_since_last();
+        let before = self.interval.map(|before| before.earlier_by(seconds));
+        let measured = self.current_interval(context)?.velocity_at(0.0, before.as_ref());
+        let Some(expected) = self.last_known_velocity() else { return Some(measured) };
+        // The velocity at the end of two intervals is (3 x₂ − 4 x₁ + x₀) / 2Δt, of which the last position hardly counts.
+        let [of_current, of_last] = self.covariances(context)?;
+        let covariance = (of_current * 2.25 + of_last * 4.0) / (seconds * seconds);
+        Some(weighted(&expected, &measured, &covariance, seconds))
+    }
+
+    /// Velocity of the last frame, if its pose is known.
+    fn last_known_velocity(&self) -> Option<Velocity> {
+        self.last.features.velocity().copied().filter(|_| self.interval.is_some())
+    }
+
+    /// Covariances of the poses of the current frame and the last one, if they are determined.
+    fn covariances(&self, context: &Context) -> Option<[Matrix6<f64>; 2]> {
+        Some([self.current.covariance(&context.sensor)?, self.last_covariance?])
     }
 
     /// Brings the features of the current frame to the time of the middle row. Returns whether that has moved them.
@@ -159,7 +185,14 @@ impl Tracker {
     /// Corrects the last frame for its velocity, which is known better now, and refines its pose.
     fn correct_last(&mut self, context: &Context, map: &Map) {
         let Some(next) = self.current_interval(context).filter(|_| self.last.features.keeps_measured()) else { return };
-        let velocity = self.interval.map_or(next.mean(), |interval| interval.at_joint(&next));
+        let seconds = self.seconds_since_last();
+        let before = self.interval.map(|before| before.earlier_by(seconds));
+        let mut velocity = next.velocity_at(-seconds, before.as_ref());
+        if let (Some(expected), Some([of_current, of_last])) = (self.last_known_velocity(), self.covariances(context)) {
+            // It is the difference of the positions of two frames that are twice as far apart.
+            let covariance = (of_current + of_last) / (4.0 * seconds * seconds);
+            velocity = weighted(&expected, &velocity, &covariance, seconds);
+        }
         self.last.drop_odometry_points();
         self.last.correct_shutter(&context.sensor, &velocity, None);
         self.last_velocity = Some(velocity);
@@ -270,6 +303,10 @@ impl Tracker {
         self.velocity = self.last.reference.map(|_| self.current.t_cam_world * self.last.t_cam_world.inverse());
         self.interval = self.current_interval(context);
         self.last_is_tracked = true;
+        self.last_covariance = None;
+        if self.current.features.keeps_measured() {
+            self.last_covariance = self.current.covariance(&context.sensor);
+        }
         if let Some(reference) = self.reference {
             self.current.set_reference(reference, map);
         }

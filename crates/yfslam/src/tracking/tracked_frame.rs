@@ -8,7 +8,7 @@ use crate::config::PoseOptimizerConfig;
 use crate::context::{Context, SensorModel};
 use crate::features::FrameFeatures;
 use crate::features::rolling_shutter::Velocity;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, perturbed};
 use crate::image::DepthImage;
 use crate::map::{KeyFrameId, Landmark, LandmarkId, Map};
 use crate::optimize::pose_only::{PoseObservation, optimize_pose, pose_covariance};
@@ -47,6 +47,8 @@ pub(crate) struct TrackedFrame {
     pub t_cam_world: Pose,
     /// Reference keyframe, and the pose relative to it, `t_cam_reference` ([`Map::relative_pose`]).
     pub reference: Option<(KeyFrameId, Pose)>,
+    /// Mean row time of the observations that gave the pose, s, and the velocity with which they were corrected.
+    observed_at: (f64, Velocity),
     observations: Vec<PoseObservation>,
     /// Feature of each observation.
     observed: Vec<u32>,
@@ -61,6 +63,15 @@ impl TrackedFrame {
     pub(crate) fn begin(&mut self, timestamp_ns: i64) {
         self.timestamp_ns = timestamp_ns;
         self.observations.clear();
+        self.observed_at = (0.0, Velocity::zeros());
+    }
+
+    /// Returns the pose `t_cam_world` at the mean time at which its observations were read, and that time, s after the middle row. It hardly
+    /// depends on the velocity with which they were corrected: velocities measured between such poses do not feed on their own errors, not
+    /// even where all observations lie at the upper or lower border.
+    pub(crate) fn observed_pose(&self) -> (Pose, f64) {
+        let (seconds, velocity) = self.observed_at;
+        (perturbed(&(velocity * -seconds), &self.t_cam_world), seconds)
     }
 
     /// Returns the covariance of the pose (see [`pose_covariance`]) from the inliers of its last refinement.
@@ -178,15 +189,21 @@ impl TrackedFrame {
             });
         }
         optimize_pose(&sensor.pinhole, config, &mut self.t_cam_world, &mut self.observations);
-        let mut landmarks = 0;
+        let (mut landmarks, mut inliers, mut seconds) = (0, 0, 0.0);
         for (&i, o) in self.observed.iter().zip(&self.observations) {
             let matched = &mut self.matches[i as usize];
+            if o.inlier {
+                inliers += 1;
+                seconds += self.features.times().color.seconds(f64::from(self.features.features[i as usize].raw[1]));
+            }
             if !o.inlier {
                 *matched = None;
             } else if matched.is_some_and(|m| m.landmark.is_some()) {
                 landmarks += 1;
             }
         }
+        let velocity = self.features.velocity().copied().unwrap_or_default();
+        self.observed_at = (seconds / f64::from(inliers.max(1)), velocity);
         landmarks
     }
 
