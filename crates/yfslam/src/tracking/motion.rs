@@ -9,9 +9,9 @@ use crate::geometry::{Pose, se3_log};
 
 /// Standard deviation of the acceleration of a camera, m/s². Source: chosen: a hand or a robot that changes direction; a certain velocity is
 /// hardly changed by it.
-const ACCELERATION_M_PER_S2: f64 = 10.0;
+const ACCELERATION_M_PER_S2: f64 = 5.0;
 /// Standard deviation of the angular acceleration, rad/s². Source: as [`ACCELERATION_M_PER_S2`].
-const ACCELERATION_RAD_PER_S2: f64 = 30.0;
+const ACCELERATION_RAD_PER_S2: f64 = 10.0;
 
 /// Mean velocity of the camera between two poses.
 #[derive(Clone, Copy, Debug)]
