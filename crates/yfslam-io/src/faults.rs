@@ -3,6 +3,8 @@
 //! In: frames in the order of their stamps, and [`Fault`]s such as `black@2+0.5`. Out: [`Delivery`]s, as a faulty camera would send them.
 //! The same frames and faults always give the same deliveries.
 
+mod false_boxes;
+
 use std::collections::VecDeque;
 use std::fmt;
 use std::str::FromStr;
@@ -10,6 +12,7 @@ use std::sync::Arc;
 
 use yfslam::{DepthImage, Frame, Image, RgbImage};
 
+use self::false_boxes::FalseBoxes;
 use crate::error::{Error, Result};
 use crate::time::{format_stamp, parse_stamp_ns};
 
@@ -34,11 +37,13 @@ pub enum FaultKind {
     NanStamp,
     /// The camera is covered: a dark, noisy image without depth.
     Covered,
+    /// The detector reports people where nobody is. Another begin gives other boxes.
+    FalseBoxes,
 }
 
 impl FaultKind {
     /// All kinds with their names and descriptions.
-    pub const ALL: [(&str, Self, &str); 9] = [
+    pub const ALL: [(&str, Self, &str); 10] = [
         ("dropped", Self::Dropped, "frames are not delivered"),
         ("repeated", Self::Repeated, "frames are delivered twice with the same stamp"),
         ("blank", Self::Blank, "white colour images"),
@@ -48,6 +53,11 @@ impl FaultKind {
         ("depth-dropout", Self::DepthDropout, "no depth in any pixel"),
         ("nan-stamp", Self::NanStamp, "time stamps that are not a number"),
         ("covered", Self::Covered, "dark, noisy colour and no depth"),
+        (
+            "false-boxes",
+            Self::FalseBoxes,
+            "up to three boxes of people who are not there, instead of those of the detector",
+        ),
     ];
 }
 
@@ -119,13 +129,16 @@ pub struct FaultInjector {
     first_ns: i64,
     frozen: Option<Frame>,
     held: Option<Delivery>,
+    false_boxes: FalseBoxes,
     ready: VecDeque<Delivery>,
 }
 
 impl FaultInjector {
     /// Creates an injector; the times of the faults are relative to `first_ns`, the stamp of the first frame.
     pub fn new(faults: Vec<Fault>, first_ns: i64) -> Self {
-        Self { faults, first_ns, frozen: None, held: None, ready: VecDeque::new() }
+        let first = faults.iter().find(|fault| fault.kind == FaultKind::FalseBoxes);
+        let false_boxes = FalseBoxes::new(first.map_or(0, |fault| fault.start_ns as u64));
+        Self { faults, first_ns, frozen: None, held: None, false_boxes, ready: VecDeque::new() }
     }
 
     /// Adds the next frame.
@@ -153,6 +166,10 @@ impl FaultInjector {
                     let seed = frame.timestamp_ns as u64;
                     repaint(&mut frame, |pixel| dark_noise(seed, pixel));
                     remove_depth(&mut frame);
+                }
+                FaultKind::FalseBoxes => {
+                    let boxes = self.false_boxes.next(frame.color.width(), frame.color.height());
+                    frame.detections.get_or_insert_default().extend(boxes);
                 }
             }
         }
@@ -199,13 +216,18 @@ fn remove_depth(frame: &mut Frame) {
     }
 }
 
-/// Returns grey levels from 4 to 19 without structure: one draw of SplitMix64 (Steele et al., OOPSLA 2014) per pixel.
+/// Returns grey levels from 4 to 19 without structure.
 fn dark_noise(seed: u64, pixel: usize) -> [u8; 3] {
-    let mut bits = (seed ^ (pixel as u64) << 32).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let bits = mixed(seed ^ (pixel as u64) << 32);
+    [0, 8, 16].map(|shift| 4 + ((bits >> shift) as u8 & 15))
+}
+
+/// Returns bits without structure that depend on all bits of the argument: one draw of SplitMix64 (Steele et al., OOPSLA 2014).
+fn mixed(bits: u64) -> u64 {
+    let mut bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    bits ^= bits >> 31;
-    [0, 8, 16].map(|shift| 4 + ((bits >> shift) as u8 & 15))
+    bits ^ bits >> 31
 }
 
 #[cfg(test)]

@@ -171,9 +171,9 @@ fn full_keeps_tracking_when_a_false_detection_covers_the_static_scene() {
         assert_eq!(poses[5..].iter().any(Option::is_none), is_lost, "{doubted_box_trust}: {poses:?}");
         let off_m = poses.iter().flatten().map(|pose| pose.translation.vector.norm()).fold(0.0, f64::max);
         assert!(off_m < 0.02, "{doubted_box_trust}: {off_m}");
-        // The landmarks of the wall show that the box is false; it is then ignored.
+        // The features of the wall stay where they are, so that the box is not believed for long.
         let features = &slam.features();
         let mut on_wall = features.iter().filter(|f| f.raw[0] < 460.0);
-        assert!(is_lost || on_wall.clone().count() > 100 && on_wall.all(|f| f.trust == 1.0));
+        assert!(is_lost || on_wall.clone().count() > 100 && on_wall.all(|f| f.trust >= 0.5));
     }
 }

@@ -15,7 +15,7 @@ pub const TOPIC: Topic = Topic { name: "ablation", title: "What each part of `fu
 const WORLDS: [&str; 5] = ["walking_xyz", "walking_rpy", "pushed_chair", "carried_box", "crowd"];
 const SEEDS: usize = 3;
 /// What is left out, and the configuration that leaves it out.
-const PARTS: [(&str, &str); 8] = [
+const PARTS: [(&str, &str); 9] = [
     ("nothing", ""),
     (
         "tracks of people are carried over missed detections",
@@ -25,6 +25,7 @@ const PARTS: [(&str, &str); 8] = [
     ("segmentation across gaps in the depth", "[dynamic.full]\nmax_gap_cells = 0\n"),
     ("features at the edges of person masks are dropped", "[dynamic.full]\nedge_px = 0.0\n"),
     ("visibility check of landmarks", "[dynamic.full]\nfree_space_margin_m = 100.0\n"),
+    ("features tell which instances move", "[dynamic.full]\ndisplacement_min_features = 100000\n"),
     ("boxes are doubted before the camera is lost", "[dynamic.full]\ndoubted_box_trust = 0.0\n"),
     ("features return when too few are left", "[dynamic]\nmin_trusted = 0\n"),
 ];

@@ -7,6 +7,7 @@ pub mod loops;
 pub mod monocular;
 pub mod recordings;
 pub mod runs;
+pub mod shutter;
 pub mod stereo;
 pub mod synthetic;
 
@@ -78,11 +79,12 @@ pub struct Topic {
 }
 
 /// All topics, in the order of the pages.
-pub const TOPICS: [&Topic; 8] = [
+pub const TOPICS: [&Topic; 9] = [
     &recordings::TOPIC,
     &synthetic::TOPIC,
     &monocular::TOPIC,
     &stereo::TOPIC,
+    &shutter::TOPIC,
     &cost::TOPIC,
     &dense::TOPIC,
     &loops::TOPIC,

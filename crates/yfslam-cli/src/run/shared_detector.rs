@@ -82,8 +82,12 @@ impl SharedDetector {
         }
     }
 
-    /// Returns the frame with its boxes for a method whose camera is rolled by `roll_deg`; without boxes if the detector skips it.
+    /// Returns the frame with its boxes for a method whose camera is rolled by `roll_deg`; without boxes if the detector skips it. A frame that
+    /// brings its own boxes keeps them.
     pub fn detect(&mut self, frame: &Frame, roll_deg: i32) -> Frame {
+        if frame.detections.is_some() {
+            return frame.clone();
+        }
         let FrameDetections { boxes, mask } = match &self.detections {
             None => FrameDetections::default(),
             Some(known) => match known.iter().find(|(roll, _)| *roll == roll_deg) {

@@ -15,6 +15,8 @@ pub struct ReadoutReport {
     pub estimate_ms: Option<f64>,
     /// Its standard deviation, ms; `null` without an estimate.
     pub sigma_ms: Option<f64>,
+    /// Whether the estimate was certain; one that is not is used for the time being.
+    pub is_certain: bool,
 }
 
 /// Where the readout time in use comes from.
@@ -37,7 +39,8 @@ impl From<Readout> for ReadoutReport {
             Readout { in_use_ms, is_certain, .. } if in_use_ms != 0.0 || is_certain => ReadoutOrigin::Estimated,
             _ => ReadoutOrigin::AssumedGlobal,
         };
-        Self { in_use_ms: readout.in_use_ms, origin, estimate_ms: readout.estimate_ms, sigma_ms: readout.sigma_ms }
+        let Readout { in_use_ms, estimate_ms, sigma_ms, is_certain, .. } = readout;
+        Self { in_use_ms, origin, estimate_ms, sigma_ms, is_certain }
     }
 }
 

@@ -41,6 +41,36 @@ config_section! {
         /// The depth difference up to which neighbouring moving cells belong to the same object.
         /// Source: chosen: the depth of a person, twice NGD-SLAM's 0.33.
         history_cluster_step_m: f32 = 0.66, in 0.0..=10.0, "m";
+        /// The number of earlier frames of which the oldest shows whether an instance has moved.
+        /// Source: chosen: with the spacing, the last half second, in which people who walk have left their place.
+        displacement_frames: usize = 8, in 1..=100, "frames";
+        /// The smallest time between two of these frames.
+        /// Source: chosen: see `displacement_frames`.
+        displacement_spacing_s: f64 = 0.25, in 0.0..=60.0, "s";
+        /// The distance from the camera up to which such a frame is compared.
+        /// Source: chosen: farther away, features look different.
+        displacement_max_distance_m: f64 = 0.5, in 0.0..=1000.0, "m";
+        /// The angle to the camera's orientation up to which such a frame is compared.
+        /// Source: chosen: see `displacement_max_distance_m`.
+        displacement_max_angle_deg: f64 = 20.0, in 0.0..=180.0, "degrees";
+        /// The distance from its place within which a feature is looked for in the earlier frame, in pixels of the finest level.
+        /// Source: chosen: three standard deviations of the position in two images; at 2 m, 12 mm.
+        displacement_px: f32 = 3.0, in 0.1..=100.0, "px";
+        /// The largest Hamming distance between the descriptors of a feature in both frames.
+        /// Source: chosen: as `tracking.hamming_low`.
+        displacement_max_bits: u32 = 50, in 0..=256, "bits";
+        /// The number of features of an instance from which on they can show whether it moves.
+        /// Source: chosen: fewer say little about a share.
+        displacement_min_features: u32 = 15, in 1..=100_000, "features";
+        /// The share of its features that is found, relative to that of the background, from which on an instance stands still.
+        /// Source: chosen: the features of a body that sits are found like those of the background, but for its arms and its edge.
+        still_share: f32 = 0.6, in 0.0..=1.0;
+        /// The same share below which an instance moves.
+        /// Source: chosen: half of `still_share`.
+        moving_share: f32 = 0.3, in 0.0..=1.0;
+        /// The share of the image from which on a person mask is doubted as long as it has not moved.
+        /// Source: chosen: a mask that covers most of the image is often false, and leaves too little for a pose.
+        max_unproven_share: f32 = 0.5, in 0.0..=1.0;
         /// The distance from a person mask within which a feature counts as part of its edge, in pixels of the finest level.
         /// Source: chosen: depth edges are exact to a few pixels.
         edge_px: f32 = 3.0, in 0.0..=100.0, "px";
@@ -54,10 +84,6 @@ config_section! {
         /// The trust of features in bounding boxes in a frame that cannot be tracked without them.
         /// Source: chosen: half, as bounding box and map contradict each other.
         doubted_box_trust: f32 = 0.5, in 0.0..=0.99;
-        /// The number of matched landmarks in a person mask from which on, in a frame that cannot be tracked without them, its bounding box
-        /// counts as false.
-        /// Source: chosen: as many inliers as a tracked frame needs.
-        refuting_landmarks: usize = 30, in 1..=100_000, "landmarks";
         /// The largest change of a person's depth over frames without a bounding box.
         /// Source: chosen: a person moves less between frames.
         max_jump_m: f32 = 0.2, in 0.001..=100.0, "m";

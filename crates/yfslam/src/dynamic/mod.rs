@@ -47,6 +47,8 @@ pub struct FilterInput<'a> {
 /// The first pose of a frame, and the map with which the frame can be compared.
 #[non_exhaustive]
 pub struct FirstPose<'a> {
+    /// Time stamp of the frame, ns.
+    pub timestamp_ns: i64,
     /// The camera, and the scales of the pyramid levels.
     pub(crate) sensor: &'a SensorModel,
     /// The map as it was before this frame.
@@ -86,15 +88,12 @@ pub trait DynamicFilter: Send + Sync {
         false
     }
 
-    /// Gives the trust `dynamic.full.doubted_box_trust` to features that only a bounding box excludes. Called when too few trusted
-    /// features remain to track the frame; it is then tracked again. Returns whether the trust of any feature has changed.
+    /// Gives the trust `dynamic.full.doubted_box_trust` to features that only a bounding box excludes. Called when too few trusted features
+    /// remain to track the frame, or when the camera is lost and recognises nothing; the frame is then tried again. Returns whether the trust
+    /// of any feature has changed.
     fn doubt_boxes(&mut self, _config: &DynamicConfig, _features: &mut FrameFeatures) -> bool {
         false
     }
-
-    /// Receives the features after a frame was tracked with the help of [`doubt_boxes`](Self::doubt_boxes): those that a box
-    /// excludes keep a trust above 0 where they match landmarks. A filter can ignore a box whose features match many landmarks.
-    fn settle_doubts(&mut self, _config: &DynamicConfig, _features: &FrameFeatures) {}
 
     /// Receives the time stamp, ns, and the final pose of a tracked frame, relative to a keyframe. It is not called for a frame
     /// that is lost.

@@ -2,10 +2,23 @@
 //!
 //! In: detections, and the segmented instance of the track. Out: the state of the track, and its region in the image.
 
-use crate::config::DynamicConfig;
+use crate::config::{DynamicConfig, FullConfig};
 use crate::detect::{BoundingBox, Detection};
 use crate::dynamic::Region;
 use crate::dynamic::segment::mask::Extent;
+
+/// Probability above which a detection is not believed. Source: OctoMap's largest probability (Hornung et al., Autonomous Robots 2013).
+const MAX_PROBABILITY: f32 = 0.97;
+/// Least log-odds by detections: at first, a box is believed.
+const MIN_PRIOR_LOG_ODDS: f32 = 0.5;
+/// Change by a frame in which it has moved. Source: OctoMap's hit, 0.7.
+const MOVED_LOG_ODDS: f32 = 0.85;
+/// Change by a frame in which it is where it was [`FULL_GAP_S`] before. Source: as [`MOVED_LOG_ODDS`].
+const STILL_LOG_ODDS: f32 = 0.85;
+/// Most that its features can show. Source: the log-odds of [`MAX_PROBABILITY`].
+const MAX_EVIDENCE: f32 = 3.0;
+/// Time in which a movable object that moves has left its place, s. Source: chosen: a slow step.
+const FULL_GAP_S: f32 = 0.3;
 
 /// A movable object that is tracked in the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,8 +35,10 @@ pub(crate) struct Track {
     pub depth_age: usize,
     /// Whether it was found to show no object; the next update removes it.
     pub ended: bool,
-    /// Whether landmarks have shown that its box is false. That holds as long as almost the same box is detected.
-    pub refuted: bool,
+    /// Highest score of its detections.
+    best_score: f32,
+    /// Log-odds that it moves by what its features have shown.
+    evidence: f32,
     /// Frames since its last detection in which the detector processed the image.
     pub(super) missed_searches: usize,
     /// Velocity of the centre of the box, px per frame.
@@ -48,7 +63,8 @@ impl Track {
             velocity: [0.0; 2],
             extent: Extent::default(),
             occluded: false,
-            refuted: false,
+            best_score: detection.score,
+            evidence: 0.0,
         }
     }
 
@@ -61,7 +77,39 @@ impl Track {
 
     /// Returns whether its instance is to be segmented.
     pub(crate) fn is_active(&self) -> bool {
-        !self.ended && !self.refuted
+        !self.ended
+    }
+
+    /// Log-odds that it moves: by its detections and by what its features have shown.
+    pub(crate) fn moving_log_odds(&self) -> f32 {
+        let score = self.best_score.clamp(1.0 - MAX_PROBABILITY, MAX_PROBABILITY);
+        (score / (1.0 - score)).ln().max(MIN_PRIOR_LOG_ODDS) + self.evidence
+    }
+
+    /// Returns whether it is more likely to stand still than to move.
+    pub(crate) fn stands_still(&self) -> bool {
+        self.moving_log_odds() < 0.0
+    }
+
+    /// Returns whether its features have shown that it moves.
+    pub(crate) fn is_proven(&self) -> bool {
+        self.evidence > 0.0
+    }
+
+    /// Returns the probability that it stands still.
+    pub(crate) fn static_probability(&self) -> f32 {
+        1.0 / (1.0 + self.moving_log_odds().exp())
+    }
+
+    /// Takes into account which share of its features, relative to that of the background, is where it was `gap_s` seconds before.
+    pub(crate) fn add_evidence(&mut self, config: &FullConfig, share: f32, gap_s: f32) {
+        if share < config.moving_share || share * config.moving_share > 1.0 {
+            // What begins to move is dropped in the same frame. If the background seems to move, the pose follows the instance.
+            self.evidence = (self.evidence.max(0.0) + MOVED_LOG_ODDS).min(MAX_EVIDENCE);
+        } else if share >= config.still_share {
+            let weight = (gap_s / FULL_GAP_S).min(1.0);
+            self.evidence = (self.evidence - STILL_LOG_ODDS * weight).max(-MAX_EVIDENCE);
+        }
     }
 
     /// Returns its box with the depth interval of the object.
@@ -115,6 +163,7 @@ impl Track {
         }
         self.bbox = detection.bbox;
         self.score = detection.score;
+        self.best_score = self.best_score.max(detection.score);
         self.misses = 0;
         self.depth_age = 0;
         self.missed_searches = 0;
@@ -129,4 +178,38 @@ pub(super) fn center(b: &BoundingBox) -> [f32; 2] {
 /// Returns a box moved by an offset, px.
 fn shifted(b: &BoundingBox, [dx, dy]: [f32; 2]) -> BoundingBox {
     BoundingBox { x_min: b.x_min + dx, y_min: b.y_min + dy, x_max: b.x_max + dx, y_max: b.y_max + dy }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns a track with a detection of that score after frames in which this share of its features was found.
+    fn track_after(score: f32, shares: &[f32]) -> Track {
+        let config = DynamicConfig::default();
+        let mut track = Track::open(&Detection { class: 0, score, bbox: BoundingBox::default() });
+        shares.iter().for_each(|share| track.add_evidence(&config.full, *share, 0.4));
+        track
+    }
+
+    #[test]
+    fn what_stands_still_is_trusted_until_it_moves() {
+        assert!(!track_after(0.5, &[]).stands_still(), "at first, a box is believed");
+        assert!(track_after(0.5, &[1.0; 3]).stands_still());
+        assert!(track_after(0.5, &[1.0; 30]).static_probability() > 0.9);
+        let moves = track_after(0.5, &[&[1.0; 30][..], &[0.1]].concat());
+        assert!(!moves.stands_still() && moves.is_proven(), "the same frame");
+    }
+
+    #[test]
+    fn the_surer_the_detector_the_less_a_still_object_is_trusted() {
+        let trust = |score| track_after(score, &[1.0; 30]).static_probability();
+        assert!(trust(0.3) > trust(0.9) && trust(0.9) > 0.5 && !track_after(1.0, &[1.0; 30]).stands_still());
+    }
+
+    #[test]
+    fn a_background_that_leaves_its_place_while_the_object_does_not_shows_that_the_pose_follows_the_object() {
+        assert!(track_after(0.5, &[4.0]).is_proven());
+        assert!(!track_after(0.5, &[0.45; 30]).stands_still(), "in between, nothing is known");
+    }
 }

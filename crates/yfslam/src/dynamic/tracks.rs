@@ -51,11 +51,10 @@ impl Tracks {
         self.track_taken.resize(self.list.len(), false);
         self.detection_taken.clear();
         self.detection_taken.resize(detections.len(), false);
-        for &(iou, t, d) in &self.pairs {
+        for &(_, t, d) in &self.pairs {
             if !self.track_taken[t] && !self.detection_taken[d] {
                 self.track_taken[t] = true;
                 self.detection_taken[d] = true;
-                self.list[t].refuted &= iou >= config.full.same_box_iou;
                 self.list[t].associate(&detections[d]);
             }
         }
@@ -64,7 +63,7 @@ impl Tracks {
                 self.list.push(Track::open(detection));
             }
         }
-        self.list.retain(|track| track.missed_searches <= if track.refuted { 0 } else { max_misses });
+        self.list.retain(|track| track.missed_searches <= max_misses);
     }
 
     /// Reassigns the box of the new track `from`, whose object would be at depth `center_m`, to a track that has no detection in
@@ -144,22 +143,6 @@ mod tests {
         tracks.update(&config, 10, &[detection(50.0, 0.5)], &[None], [640, 480]);
         tracks.update(&config, 10, &[detection(52.0, 0.15)], &[None], [640, 480]);
         assert_eq!((tracks.list.len(), tracks.list[0].misses), (1, 0));
-    }
-
-    #[test]
-    fn a_refuted_box_is_ignored_as_long_as_it_stays() {
-        let config = DynamicConfig::default();
-        let mut tracks = Tracks::default();
-        let mut refuted = |next: &[Detection]| {
-            tracks.list.clear();
-            tracks.update(&config, 10, &[detection(50.0, 0.8)], &[None], [640, 480]);
-            tracks.list[0].refuted = true;
-            tracks.update(&config, 10, next, &vec![None; next.len()], [640, 480]);
-            tracks.list.iter().map(Track::is_active).collect::<Vec<_>>()
-        };
-        assert_eq!(refuted(&[detection(55.0, 0.8)]), [false]);
-        assert_eq!(refuted(&[detection(90.0, 0.8)]), [true], "another person");
-        assert_eq!(refuted(&[]), [false; 0], "it does not continue without a detection");
     }
 
     /// Returns the tracks after ten frames in which a person 2 m away, who is segmented, walks by 8 px a frame.

@@ -111,6 +111,17 @@ impl FrameFeatures {
         self.build_grid();
     }
 
+    /// Copies features, descriptors and grid of another frame into the memory of this one, without what was measured at the times of the rows.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.features.clone_from(&other.features);
+        self.descriptors.clone_from(&other.descriptors);
+        self.bounds = other.bounds;
+        self.order.clone_from(&other.order);
+        self.start.clone_from(&other.start);
+        self.measured.clear();
+        (self.times, self.velocity) = (other.times, other.velocity);
+    }
+
     /// Keeps positions and depths as they are now, as those measured at the times of their rows.
     pub(crate) fn keep_measured(&mut self, times: FrameTimes) {
         self.times = times;

@@ -8,7 +8,7 @@ use super::{MapUse, Pass, Slam};
 use crate::frame::Frame;
 use crate::image::DepthImage;
 use crate::loops::{SearchRegion, relocalise};
-use crate::tracking::{LostReason, TrackingState};
+use crate::tracking::{LostReason, TrackedFrame, TrackingState};
 
 impl Slam {
     /// Estimates the pose of the frame.
@@ -72,9 +72,6 @@ impl Slam {
         let tracked = filter.doubt_boxes(&config.dynamic, &mut self.tracker.current.features)
             && self.tracker.track(&self.context, self.owner.map(), filter, depth, min_inliers).is_ok();
         self.tracker.current.settle_doubts();
-        if tracked {
-            self.filter.settle_doubts(&config.dynamic, &self.tracker.current.features);
-        }
         tracked
     }
 
@@ -84,7 +81,12 @@ impl Slam {
         let recogniser = self.owner.recogniser();
         let mut recogniser = recogniser.lock().unwrap_or_else(PoisonError::into_inner);
         let map = self.owner.map();
-        let found = relocalise(&mut recogniser, &self.context, map, &mut self.tracker.current, region.as_ref());
+        let (context, current) = (&self.context, &mut self.tracker.current);
+        let mut search =
+            |current: &mut TrackedFrame| relocalise(&mut recogniser, context, map, current, region.as_ref());
+        // A place may be hidden by a false box only.
+        let found = search(current)
+            || (self.filter.doubt_boxes(&context.config.dynamic, &mut current.features) && search(current));
         let localised = if found {
             let min_inliers = self.context.config.place_recognition.relocalise_min_inliers;
             self.tracker.track_local_map(&self.context, map, min_inliers)

@@ -120,8 +120,9 @@ impl Tracker {
         if self.correct_shutter(context, self.current_velocity(context), Some(depth)) {
             self.current.features.build_grid();
         }
-        let first = FirstPose { sensor: &context.sensor, map, t_cam_world: &self.current.t_cam_world };
-        if filter.after_pose(&context.config.dynamic, &first, &mut self.current.features) {
+        let TrackedFrame { timestamp_ns, t_cam_world, features, .. } = &mut self.current;
+        let first = FirstPose { timestamp_ns: *timestamp_ns, sensor: &context.sensor, map, t_cam_world };
+        if filter.after_pose(&context.config.dynamic, &first, features) {
             self.current.drop_distrusted();
             self.current.refine_pose(context);
         }

@@ -81,7 +81,7 @@ A single camera (--sensor mono):
   of the scale.
 
 Kinds of faults (--fault):
-  dropped, repeated, blank, black, frozen, late, depth-dropout, nan-stamp, covered
+  dropped, repeated, blank, black, frozen, late, depth-dropout, nan-stamp, covered, false-boxes
 
 Signals:
   After SIGINT (Ctrl-C) or SIGTERM, the run ends with all files for the frames so far, and run.json has \"interrupted\": true. A second

@@ -76,7 +76,7 @@ impl DepthHistory {
 
     /// Compares the depths of the frame's cells with all entries whose camera was near enough.
     pub(super) fn compare(&mut self, config: &FullConfig, first: &FirstPose<'_>, depth_m: &[f32]) {
-        let FirstPose { sensor, map, t_cam_world } = *first;
+        let FirstPose { sensor, map, t_cam_world, .. } = *first;
         self.prepare(config, sensor);
         self.nearer.clear();
         self.nearer.resize(depth_m.len(), 0);
@@ -250,7 +250,7 @@ mod tests {
         for _ in 0..3 {
             history.insert(&config.dynamic.full, 0, (reference, Pose::identity()), &depths(&before));
         }
-        let first = FirstPose { sensor: &sensor, map: &map, t_cam_world: &moved };
+        let first = FirstPose { timestamp_ns: 0, sensor: &sensor, map: &map, t_cam_world: &moved };
         let mut cells = Vec::new();
         history.compare(&config.dynamic.full, &first, &depths(&shown));
         history.for_each_moving_cell(&config.dynamic.full, &depths(&shown), |column, row| cells.push((column, row)));

@@ -2,12 +2,15 @@
 //!
 //! In: detections, masks, the depth image; later a first pose. Out: the trust of each feature. It extends YF-SLAM: an instance is
 //! segmented along its surface instead of as the intersection of a box and a depth interval; an instance behind another one is
-//! segmented too; moving objects that no detector recognises are found by comparison with the depth history.
+//! segmented too; moving objects that no detector recognises are found by comparison with the depth history; the features of an instance
+//! show whether it moves or stands still.
 
 mod depth_history;
+mod displacement;
 
-use crate::config::DynamicConfig;
+use crate::config::{DynamicConfig, FullConfig};
 use crate::dynamic::full::depth_history::DepthHistory;
+use crate::dynamic::full::displacement::EarlierFrames;
 use crate::dynamic::segment::depth_clusters::DepthClusters;
 use crate::dynamic::segment::mask::InstanceMask;
 use crate::dynamic::segment::segmenter::Segmenter;
@@ -23,19 +26,19 @@ pub(super) struct Full {
     tracks: Tracks,
     clusters: DepthClusters,
     segmenter: Segmenter,
-    /// The instances of a frame whose boxes are doubted.
-    doubted: InstanceMask,
     /// What must stay out of dense maps. Instances stay here even where the features on them are trusted, because they stand still
     /// or because too few other features remain.
     unmapped: InstanceMask,
+    /// The instances of all tracks, also of those that stand still, without cells that the depth history shows to be background.
+    tracked: InstanceMask,
     regions: Vec<Region>,
     history: DepthHistory,
+    earlier: EarlierFrames,
     /// Depth of the cells that the depth history compares, m.
     coarse_m: Vec<f32>,
     /// The same, but 0 where something moves.
     static_m: Vec<f32>,
-    /// Counters of each track: in `clear_static` its cells that are unchanged and changed with respect to the depth history; in
-    /// `settle_doubts` its matched landmarks.
+    /// Of each track, its cells that are unchanged and changed with respect to the depth history.
     counters: Vec<[u32; 2]>,
     /// Whether the last frame was compared with the depth history.
     compared: bool,
@@ -57,16 +60,62 @@ impl Full {
     /// near an instance, then the instances of the lowest score.
     fn set_trust(&mut self, config: &DynamicConfig, input: &FilterInput<'_>, features: &mut FrameFeatures) {
         let needed = config.min_trusted.min(features.len());
-        if self.segmenter.set_trust(config.full.edge_px, input.sensor, features) >= needed {
-            return;
+        self.release_still_instances();
+        self.release_unproven_instances(config);
+        if self.segmenter.set_trust(config.full.edge_px, input.sensor, features) < needed {
+            self.regions.sort_by(|a, b| b.score.total_cmp(&a.score));
+            while self.segmenter.set_trust(0.0, input.sensor, features) < needed {
+                let Some(dropped) = self.regions.pop() else { break };
+                // Instances of equal score are treated alike.
+                self.regions.retain(|region| region.score > dropped.score);
+                self.segmenter.begin_frame(input);
+                self.segmenter.segment(config, &mut self.clusters, &mut self.tracks, dropped.score.next_up());
+                self.release_still_instances();
+            }
         }
-        self.regions.sort_by(|a, b| b.score.total_cmp(&a.score));
-        while self.segmenter.set_trust(0.0, input.sensor, features) < needed {
-            let Some(dropped) = self.regions.pop() else { return };
-            // Instances of equal score are treated alike.
-            self.regions.retain(|region| region.score > dropped.score);
-            self.segmenter.begin_frame(input);
-            self.segmenter.segment(config, &mut self.clusters, &mut self.tracks, dropped.score.next_up());
+        self.weigh(config, features);
+    }
+
+    /// Takes the instances that stand still out of what moves.
+    fn release_still_instances(&mut self) {
+        for (t, track) in self.tracks.list.iter().enumerate() {
+            if track.stands_still() {
+                self.segmenter.instances.clear_track(t);
+            }
+        }
+    }
+
+    /// Takes instances that have not shown any motion out of what moves if they cover most of the image.
+    fn release_unproven_instances(&mut self, config: &DynamicConfig) {
+        let instances = &mut self.segmenter.instances;
+        for (t, _) in self.tracks.list.iter().enumerate().filter(|(_, track)| !track.is_proven()) {
+            if instances.share_of_track(t) > config.full.max_unproven_share {
+                instances.clear_track(t);
+            }
+        }
+    }
+
+    /// Gives trusted features on instances the trust of these.
+    fn weigh(&mut self, config: &DynamicConfig, features: &mut FrameFeatures) {
+        for f in features.features.iter_mut().filter(|f| f.trust > 0.0) {
+            if let Some(track) = self.tracked.instance_at(f.raw).and_then(|t| self.tracks.list.get(t)) {
+                f.trust = if track.stands_still() { track.static_probability() } else { config.full.doubted_box_trust };
+            }
+        }
+    }
+
+    /// Learns from the displacement of their features which instances move and which stand still.
+    fn update_evidence(&mut self, config: &FullConfig, first: &FirstPose<'_>, features: &FrameFeatures) {
+        let (unmapped, tracks) = (&self.unmapped, &mut self.tracks.list);
+        self.earlier.compare(config, first, features, tracks.len(), |raw| unmapped.instance_at(raw));
+        let [recent, oldest] = &self.earlier.comparisons;
+        for (t, track) in tracks.iter_mut().enumerate() {
+            let shares = [recent, oldest].map(|comparison| comparison.relative_share(config, t));
+            // What moves slowly has left its place only after a while.
+            let least = shares.into_iter().flatten().min_by(f32::total_cmp);
+            if let (Some(_), Some(share)) = (shares[0], least) {
+                track.add_evidence(config, share, recent.gap_s);
+            }
         }
     }
 
@@ -76,13 +125,14 @@ impl Full {
         self.counters.clear();
         self.counters.resize(self.tracks.list.len(), [0; 2]);
         for cell in 0..self.coarse_m.len() {
-            let Some(track) = self.segmenter.instances.track_of_coarse_cell(cell) else { continue };
+            let Some(track) = self.tracked.track_of_coarse_cell(cell) else { continue };
             let Some(is_static) = self.history.is_static(cell) else { continue };
             if let Some(counter) = self.counters.get_mut(track) {
                 counter[usize::from(!is_static)] += 1;
             }
             if is_static {
                 self.segmenter.instances.clear_coarse_cell(cell);
+                self.tracked.clear_coarse_cell(cell);
                 if self.tracks.list.get(track).is_none_or(|track| track.misses > 0) {
                     self.unmapped.clear_coarse_cell(cell);
                 }
@@ -101,9 +151,9 @@ impl Full {
     fn sample_depth(&mut self) {
         self.coarse_m.clear();
         self.static_m.clear();
-        for (moves, z) in self.segmenter.instances.coarse_cells() {
+        for ((moves, z), (unmapped, _)) in self.segmenter.instances.coarse_cells().zip(self.unmapped.coarse_cells()) {
             self.coarse_m.push(z);
-            self.static_m.push(if moves { 0.0 } else { z });
+            self.static_m.push(if moves || unmapped { 0.0 } else { z });
         }
     }
 }
@@ -123,6 +173,7 @@ impl DynamicFilter for Full {
         self.segmenter.begin_frame(input);
         self.segmenter.segment(config, &mut self.clusters, &mut self.tracks, 0.0);
         self.unmapped.copy_from(&self.segmenter.instances);
+        self.tracked.copy_from(&self.segmenter.instances);
         self.regions.clear();
         let active = self.tracks.list.iter().filter(|track| track.is_active());
         self.regions.extend(active.map(|track| track.region(config)));
@@ -142,6 +193,8 @@ impl DynamicFilter for Full {
             unmapped.mark_coarse_cell(column, row);
             found = true;
         });
+        self.update_evidence(&config.full, first, features);
+        self.release_still_instances();
         let mut trusted: usize = features.features.iter().filter(|f| f.trust > 0.0).count();
         for f in &mut features.features {
             let edge_px = config.full.edge_px * first.sensor.scale(f.octave);
@@ -152,13 +205,15 @@ impl DynamicFilter for Full {
             } else if f.trust > 0.0 && moves && trusted > config.min_trusted {
                 f.trust = 0.0;
                 trusted -= 1;
+                found = true;
             }
         }
+        self.weigh(config, features);
+        self.earlier.keep(&config.full, first.timestamp_ns, features);
         found
     }
 
     fn doubt_boxes(&mut self, config: &DynamicConfig, features: &mut FrameFeatures) -> bool {
-        self.doubted.copy_from(&self.segmenter.instances);
         (0..self.tracks.list.len()).for_each(|track| self.segmenter.instances.clear_track(track));
         let mut any = false;
         for f in features.features.iter_mut().filter(|f| f.trust == 0.0 && !self.segmenter.instances.covers(f.raw, 0.0))
@@ -169,26 +224,12 @@ impl DynamicFilter for Full {
         any
     }
 
-    /// A box whose features match many landmarks is false.
-    fn settle_doubts(&mut self, config: &DynamicConfig, features: &FrameFeatures) {
-        self.counters.clear();
-        self.counters.resize(self.tracks.list.len(), [0; 2]);
-        let found = features.features.iter().filter(|f| f.trust > 0.0 && f.trust < 1.0);
-        for track in found.filter_map(|f| self.doubted.instance_at(f.raw)) {
-            if let Some([matched, _]) = self.counters.get_mut(track) {
-                *matched += 1;
-            }
-        }
-        for (track, [matched, _]) in self.tracks.list.iter_mut().zip(&self.counters) {
-            track.refuted |= *matched as usize >= config.full.refuting_landmarks;
-        }
-    }
-
     fn end_frame(&mut self, config: &DynamicConfig, timestamp_ns: i64, relative_pose: KeyframeRelativePose) {
         if self.history.is_due(&config.full, timestamp_ns) {
             self.sample_depth();
             self.history.insert(&config.full, timestamp_ns, relative_pose, &self.static_m);
         }
+        self.earlier.insert(&config.full, timestamp_ns, relative_pose);
     }
 
     fn regions(&self) -> &[Region] {
@@ -205,6 +246,7 @@ impl DynamicFilter for Full {
 
     fn reset_history(&mut self) {
         self.history.clear();
+        self.earlier.clear();
     }
 }
 
@@ -242,7 +284,7 @@ mod tests {
         let sensor = SensorModel::new(&camera, &settings, &[1.0]);
         let mut map = Map::default();
         let reference = map.insert_keyframe(0, Isometry3::identity(), FrameFeatures::default());
-        let first = FirstPose { sensor: &sensor, map: &map, t_cam_world: &Isometry3::identity() };
+        let first = FirstPose { timestamp_ns: 0, sensor: &sensor, map: &map, t_cam_world: &Isometry3::identity() };
         let mut full = Full::default();
         let mut features = FrameFeatures::default();
         let mut process = |time_ns: i64, person: bool, boxes: &[Detection]| {

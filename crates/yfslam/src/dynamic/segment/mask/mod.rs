@@ -144,6 +144,12 @@ impl InstanceMask {
         least.is_finite().then(|| (least, (squares / count - (sum / count).powi(2)).max(0.0)))
     }
 
+    /// Returns the share of the image that the instance of a track covers.
+    pub(crate) fn share_of_track(&self, track: usize) -> f32 {
+        let label = label_of(track);
+        self.labels.iter().filter(|other| **other == label).count() as f32 / self.labels.len().max(1) as f32
+    }
+
     /// Clears the labels of a track.
     pub(crate) fn clear_track(&mut self, track: usize) {
         let label = label_of(track);
