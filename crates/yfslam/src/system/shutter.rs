@@ -1,7 +1,10 @@
 //! The rolling shutter over time: what a frame shows about the one before it, and the readout time where the camera does not tell it.
 
+use nalgebra::Vector6;
+
 use super::{Anchor, Slam};
 use crate::features::rolling_shutter::{FrameTimes, RowTimes};
+use crate::geometry::perturbed;
 use crate::tracking::ReadoutEstimator;
 
 /// Estimates that follow each other: each is made with the poses that the one before has corrected.
@@ -42,6 +45,8 @@ pub(super) struct ReadoutSearch {
     round: usize,
     /// Sum of the mean squared residuals of the depths, and their number.
     depth_residuals: (f64, usize),
+    /// Time stamps, ns, of the frames so far, and how the pose of each, relative to its keyframe, changes with the readout time.
+    pose_changes: Vec<(i64, Vector6<f64>)>,
 }
 
 impl Slam {
@@ -64,7 +69,8 @@ impl Slam {
                 (*sum, *count) = (*sum + residual, *count + 1);
                 self.readout.depth_residual = Some(*sum / *count as f64);
             }
-            self.tracker.estimate_readout(&self.context, self.owner.map(), &mut search.estimator);
+            let change = self.tracker.estimate_readout(&self.context, self.owner.map(), &mut search.estimator);
+            search.pose_changes.extend(change.map(|change| (timestamp_ns, change)));
             self.readout_search = self.conclude(search);
         }
     }
@@ -97,15 +103,15 @@ impl Slam {
             return Some(search);
         }
         match (is_certain, is_rolling && is_possible) {
-            (true, true) => self.use_readout(readout_ms),
+            (true, true) => self.use_readout(readout_ms, &search.pose_changes),
             // At first, a rough value is better than none.
-            (false, true) if search.round == 0 => self.use_readout(readout_ms),
+            (false, true) if search.round == 0 => self.use_readout(readout_ms, &search.pose_changes),
             (false, _) => return Some(search),
             (true, false) if readout_ms.abs() >= GLOBAL_SIGMAS * sigma_ms => return Some(search),
             // A global shutter, or something that the model does not describe: the images are used as they are.
             (true, false) => {
                 if search.round > 0 {
-                    self.use_readout(0.0);
+                    self.use_readout(0.0, &search.pose_changes);
                 }
                 return None;
             }
@@ -115,8 +121,16 @@ impl Slam {
         (search.round < ROUNDS).then_some(search)
     }
 
-    /// Uses a readout time from now on, and corrects the map for it.
-    fn use_readout(&mut self, readout_ms: f64) {
+    /// Uses a readout time from now on, and corrects the map and the poses of earlier frames for it.
+    fn use_readout(&mut self, readout_ms: f64, pose_changes: &[(i64, Vector6<f64>)]) {
+        let change_s = 1e-3 * (readout_ms - self.readout.in_use_ms);
+        let mut changes = pose_changes.iter().peekable();
+        for anchor in &mut self.anchors {
+            while changes.next_if(|(timestamp_ns, _)| *timestamp_ns < anchor.timestamp_ns).is_some() {}
+            if let Some((_, change)) = changes.next_if(|(timestamp_ns, _)| *timestamp_ns == anchor.timestamp_ns) {
+                anchor.t_cam_reference = perturbed(&(change * change_s), &anchor.t_cam_reference);
+            }
+        }
         let camera = &self.context.sensor.camera;
         let color = RowTimes::new(camera, readout_ms);
         let depth = camera.depth_readout_ms.map_or(color, |ms| RowTimes::new(camera, ms));

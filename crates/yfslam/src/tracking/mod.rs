@@ -23,7 +23,7 @@ use crate::map::{KeyFrameId, KeyframeRelativePose, LandmarkId, Map};
 use keyframe_policy::{FrameSummary, is_keyframe_wanted};
 use local_map::LocalMap;
 use motion::{Interval, weighted};
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 pub(crate) use readout_estimator::ReadoutEstimator;
 use search::{search_keyframe, search_last_frame, search_local_map};
 pub use state::{LostReason, TrackingState};
@@ -337,10 +337,14 @@ impl Tracker {
     }
 
     /// Lets the last frame, whose velocity is known now, tell about the readout time.
-    pub(crate) fn estimate_readout(&self, context: &Context, map: &Map, estimator: &mut ReadoutEstimator) {
-        if let (Some(reference), Some(_)) = (self.reference, self.last_velocity) {
-            estimator.add(context, map, reference, &self.last);
-        }
+    pub(crate) fn estimate_readout(
+        &self,
+        context: &Context,
+        map: &Map,
+        estimator: &mut ReadoutEstimator,
+    ) -> Option<Vector6<f64>> {
+        let (reference, _) = self.last.reference.filter(|_| self.last_velocity.is_some())?;
+        estimator.add(context, map, reference, &self.last)
     }
 
     /// Returns time and relative pose of the last frame.

@@ -83,14 +83,18 @@ impl ReadoutEstimator {
         self.keyframes.clear();
     }
 
-    /// Adds a tracked frame whose velocity is known from its neighbours.
-    pub(crate) fn add(&mut self, context: &Context, map: &Map, reference: KeyFrameId, frame: &TrackedFrame) {
+    /// Adds a tracked frame whose velocity is known from its neighbours. Returns how its pose relative to the keyframe changes with the readout
+    /// time: a perturbation, m and rad, for each second; `None` if the pair has too few points.
+    pub(crate) fn add(
+        &mut self,
+        context: &Context,
+        map: &Map,
+        reference: KeyFrameId,
+        frame: &TrackedFrame,
+    ) -> Option<Vector6<f64>> {
         let TrackedFrame { timestamp_ns, features, matches, t_cam_world, .. } = frame;
-        let Some(keyframe) = map.keyframe(reference).filter(|_| !self.is_full()) else { return };
-        let (Some(of_frame), Some(of_keyframe)) = (features.velocity(), keyframe.features.velocity()) else { return };
-        if timestamp_ns.abs_diff(keyframe.timestamp_ns) < MIN_GAP_NS {
-            return;
-        }
+        let keyframe = map.keyframe(reference).filter(|k| !self.is_full() && k.timestamp_ns != *timestamp_ns)?;
+        let (of_frame, of_keyframe) = (features.velocity()?, keyframe.features.velocity()?);
         let sensor = &context.sensor;
         let share = |row: f32| f64::from(row) / (sensor.camera.height.max(2) - 1) as f64 - 0.5;
         self.points.clear();
@@ -112,11 +116,14 @@ impl ReadoutEstimator {
             self.points.push(PairPoint { point, row_motion, row: share(seen.row), measurement });
         }
         if self.points.len() < MIN_POINTS {
-            return;
+            return None;
         }
         let before = self.estimate().map_or(0.0, |estimate| estimate.readout_s);
-        let t_frame_keyframe = t_cam_world * keyframe.t_cam_world.inverse();
-        let Some(sums) = refine(context, &self.points, t_frame_keyframe, of_frame, before) else { return };
+        let mut t_frame_keyframe = t_cam_world * keyframe.t_cam_world.inverse();
+        let (sums, pose_change) = refine(context, &self.points, &mut t_frame_keyframe, of_frame, before)?;
+        if timestamp_ns.abs_diff(keyframe.timestamp_ns) < MIN_GAP_NS {
+            return Some(pose_change);
+        }
         match self.keyframes.last_mut().filter(|(id, _)| *id == reference) {
             Some((_, total)) => {
                 total.information += sums.information;
@@ -124,6 +131,7 @@ impl ReadoutEstimator {
             }
             None => self.keyframes.push((reference, sums)),
         }
+        Some(pose_change)
     }
 
     /// Returns the estimate so far; `None` with fewer than three keyframes or without any motion.
@@ -152,14 +160,15 @@ fn depth_in(map: &Map, id: LandmarkId, t_cam_world: &Pose) -> Option<f64> {
     map.landmark(id).map(|l| (t_cam_world * l.position).z).filter(|z| *z > 0.0)
 }
 
-/// Refines the relative pose of a pair and the readout time together. Returns what the pair says about the readout time.
+/// Refines the relative pose of a pair and the readout time together. Returns what the pair says about the readout time, and how the pose
+/// changes with it.
 fn refine(
     context: &Context,
     points: &[PairPoint],
-    mut t_frame_keyframe: Pose,
+    t_frame_keyframe: &mut Pose,
     velocity: &Vector6<f64>,
     readout_s: f64,
-) -> Option<Sums> {
+) -> Option<(Sums, Vector6<f64>)> {
     let pinhole = &context.sensor.pinhole;
     let mut sums = None;
     for _ in 0..STEPS {
@@ -167,7 +176,7 @@ fn refine(
         let mut b = SVector::<f64, 7>::zeros();
         let rotation = t_frame_keyframe.rotation.to_rotation_matrix();
         for p in points {
-            let at_zero = t_frame_keyframe * nalgebra::Point3::from(p.point + p.row_motion * readout_s);
+            let at_zero = *t_frame_keyframe * nalgebra::Point3::from(p.point + p.row_motion * readout_s);
             let in_frame = motion_of(&at_zero.coords, velocity) * -p.row;
             let seen = at_zero.coords + in_frame * readout_s;
             if seen.z <= 1e-3 {
@@ -189,12 +198,13 @@ fn refine(
         let poses: Matrix6<f64> = h.fixed_view::<6, 6>(0, 0).into_owned();
         let cross: Vector6<f64> = h.fixed_view::<6, 1>(0, 6).into_owned();
         let solved = poses.cholesky()?;
-        let information = h[(6, 6)] - cross.dot(&solved.solve(&cross));
+        let pose_change = -solved.solve(&cross);
+        let information = h[(6, 6)] + cross.dot(&pose_change);
         let gradient: Vector6<f64> = b.fixed_rows::<6>(0).into_owned();
         let reduced = b[6] - cross.dot(&solved.solve(&gradient));
-        sums = Some(Sums { information, evidence: reduced + information * readout_s });
+        sums = Some((Sums { information, evidence: reduced + information * readout_s }, pose_change));
         // A pair alone says little about the readout time, so only the pose is refined with it.
-        t_frame_keyframe = perturbed(&solved.solve(&gradient), &t_frame_keyframe);
+        *t_frame_keyframe = perturbed(&solved.solve(&gradient), t_frame_keyframe);
     }
     sums
 }
@@ -236,7 +246,19 @@ mod tests {
                     PairPoint { point, row_motion, row: v / 479.0 - 0.5, measurement }
                 })
                 .collect();
-            let sums = refine(&context, &points, motion, &of_frame, 0.0).unwrap();
+            let (sums, _) = refine(&context, &points, &mut motion.to_owned(), &of_frame, 0.0).unwrap();
+            // Near the truth, where no point is an outlier, the pose changes as it is said.
+            let [mut exact, mut other] = [motion; 2];
+            let (_, pose_change) = refine(&context, &points, &mut exact, &of_frame, readout_s).unwrap();
+            refine(&context, &points, &mut other, &of_frame, readout_s + 1e-3).unwrap();
+            let error = perturbed(&(pose_change * 1e-3), &exact) * other.inverse();
+            let moved = other * exact.inverse();
+            let is_predicted = |error: f64, whole: f64| error < 0.05 * whole + 1e-6;
+            assert!(
+                is_predicted(error.translation.vector.norm(), moved.translation.vector.norm()),
+                "{error} of {moved}"
+            );
+            assert!(is_predicted(error.rotation.angle(), moved.rotation.angle()), "{error} of {moved}");
             estimator.keyframes.push((keys.insert(()), sums));
         }
         estimator.estimate().unwrap()
