@@ -145,7 +145,7 @@ def train(rank, world, options):
 
     caches = [data.Cache(folder, config.classes) for folder in options.caches]
     held_out = data.Cache(options.caches[0], config.classes, held_out=True)
-    samples = data.Samples(caches, options.shares or [1] * len(caches), config.seed)
+    samples = data.Samples(caches, options.shares or [1] * len(caches), config.seed, config.empty)
     batches = Batches(config, seen, stop, options.side, rank, world)
 
     saved = told = time.time()
