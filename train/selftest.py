@@ -96,7 +96,7 @@ def a_resumed_training_equals_an_uninterrupted_one():
             cache.cv2.imwrite(str(path), rng.integers(0, 256, (60, 80, 3), np.uint8))
             pictures.append((path, np.array([[0, 0.2, 0.1, 0.6, 0.9]])))
         cache.write(pictures, ["person"], folder / "cache", 0.3)
-        options = dict(caches=[folder / "cache"], shares=None, decay=0, side=[64], start=None, name=None, every=10**9, processes=1, set=["batch=4"])
+        options = dict(caches=[folder / "cache"], shares=None, decay=0, side=[64], start=None, name=None, every=10**9, processes=1, set=["batch=4"], freeze=["stem"])
         for run, parts in (("whole", [16]), ("parts", [8, 8])):
             (folder / run).mkdir()
             for samples in parts:
