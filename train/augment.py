@@ -14,8 +14,8 @@ VISIBLE = 0.1  # share of a box that must remain for it to count; otherwise its 
 LEAST_SIDE = 9.0  # px
 CLOSE = 0.5  # share of the images with people, except mosaics, with a close person, mostly cut by the left or the right edge
 CLUTTER = 0.8  # share of the images without people that get drawn objects, and half this share of those with people
-DESK = 0.3  # share of the images without people with a drawn desk in the foreground
-EMPTY = 0.5  # share of the images that are reduced to a part without people
+DESK = 0.3  # share of the parts without people with a drawn desk in the foreground
+ROOM_PART, ROOM_CLUTTER = 0.35, 0.2  # shares of the photos of rooms that are reduced to a part, and that get drawn objects
 
 
 def angle(rng):
@@ -133,10 +133,12 @@ def without_people(rng, image, boxes):
     return clutter.cover(rng, image, boxes), boxes[:0]
 
 
-def sample(rng, draw, side, mosaic=0.35, strength=1.0):
+def sample(rng, draw, side, mosaic=0.35, strength=1.0, empty=0.5, rooms=False):
     """Returns an image of side x side px, its boxes [n, 5] (class, corners, px) and regions to ignore [m, 4].
 
-    `draw(rng)` returns an image and its relative boxes. `strength` 0 leaves the image unchanged, 1 augments it fully.
+    `draw(rng)` returns an image and its relative boxes. `strength` 0 leaves the image unchanged, 1 augments it fully. A share `empty`
+    of the images is reduced to a part without people. `rooms`: the images are photos without people, which show enough objects of
+    their own.
     """
     border = [(114, 114, 114), (0, 0, 0), tuple(int(v) for v in rng.integers(0, 256, 3))][rng.choice(3, p=[0.5, 0.3, 0.2])]
     canvas = np.empty((side, side, 3), np.uint8)
@@ -145,11 +147,11 @@ def sample(rng, draw, side, mosaic=0.35, strength=1.0):
     found, ignored = [], []
     for (x0, x1), (y0, y1) in spans:
         image, boxes = draw(rng)
-        if rng.random() < EMPTY:
+        if rng.random() < (strength * ROOM_PART if rooms else empty):
             image, boxes = without_people(rng, image, boxes)
             if rng.random() < strength * DESK:
                 image = clutter.desk(rng, image)
-        if rng.random() < strength * CLUTTER * (0.5 if len(boxes) else 1):
+        if rng.random() < strength * (ROOM_CLUTTER if rooms else CLUTTER * (0.5 if len(boxes) else 1)):
             image = clutter.strew(rng, image, boxes)
         single = len(spans) == 1
         zoom = np.exp(rng.uniform(np.log(0.65), np.log(2.3))) if single else np.exp(rng.uniform(np.log(0.8), np.log(1.8)))

@@ -2,6 +2,7 @@
 
     python -m train.cache yolo  PHOTOS  CACHE --classes person      # PHOTOS/images/*, PHOTOS/labels/*.txt: class cx cy w h, relative
     python -m train.cache synth FOLDER  CACHE --classes person chair  # recordings of `yfslam synth`, at any depth below
+    python -m train.cache empty ROOMS   CACHE --classes person      # ROOMS/*: photos without any object of the classes
 
 CACHE/images.npy: uint8 [N, 352, 352, 3], blue green red, stretched. CACHE/labels.npz: boxes [M, 5] (class, x0, y0, x1, y1;
 relative), first box of each image [N + 1], group [N], held_out [N], and the class names.
@@ -30,6 +31,12 @@ def yolo_folder(folder, classes):
         rows = np.array([line.split()[:5] for line in text.splitlines() if line.strip()], np.float32).reshape(-1, 5)
         kind, x, y, w, h = rows.T
         yield path, np.stack([kind, x - w / 2, y - h / 2, x + w / 2, y + h / 2], 1)
+
+
+def empty_folder(folder, classes):
+    """Yields (path, no boxes) of a folder of photos without any object of the classes."""
+    for path in sorted(folder.iterdir()):
+        yield path, np.zeros((0, 5), np.float32)
 
 
 def synthetic_folders(folder, classes):
@@ -109,14 +116,17 @@ def write(pictures, classes, out, share):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("form", choices=["yolo", "synth"])
+    parser.add_argument("form", choices=["yolo", "synth", "empty"])
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("cache", type=pathlib.Path)
     parser.add_argument("--classes", nargs="+", default=["person"], help="names of the class numbers in the label files; of synthetic folders: the classes to keep")
+    parser.add_argument("--tallest", type=float, default=0, help="leave out photos of which no object is taller than this share of the image")
     parser.add_argument("--hold-out", type=float, default=0.15, help="share of the scenes that is not used for training")
     options = parser.parse_args()
-    read = {"yolo": yolo_folder, "synth": synthetic_folders}[options.form]
-    write(read(options.folder, options.classes), options.classes, options.cache, options.hold_out)
+    read = {"yolo": yolo_folder, "synth": synthetic_folders, "empty": empty_folder}[options.form]
+    tallest = lambda rows: max(rows[:, 4] - rows[:, 2], default=0)
+    pictures = ((path, rows) for path, rows in read(options.folder, options.classes) if not options.tallest or tallest(rows) > options.tallest)
+    write(pictures, options.classes, options.cache, options.hold_out)
 
 
 if __name__ == "__main__":

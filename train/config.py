@@ -20,3 +20,4 @@ class Config:
     sides: list = dataclasses.field(default_factory=lambda: [[0, [160, 192, 224]], [160000, [192, 224, 256, 288]]])
     mosaic: float = 0.35  # share of images that are composed of four
     strength: float = 1.0  # of the augmentation, 0 to 1
+    empty: float = 0.5  # share of the images with people that are reduced to a part without people

@@ -26,6 +26,7 @@ class Cache:
         number = np.array([classes.index(name) if name in classes else -1 for name in names])
         first = labels["first"]
         self.chosen = np.flatnonzero(labels["held_out"] == held_out)
+        self.empty = not len(labels["boxes"])  # photos without people
         self.boxes = []
         for index in range(len(self.images)):
             rows = labels["boxes"][first[index]:first[index + 1]].astype(np.float64)
@@ -35,6 +36,8 @@ class Cache:
         group = labels["group"][self.chosen]
         size = np.bincount(group)[group]
         self.weight = size**-0.5
+        if (folder / "hard.npy").exists():  # from train.mine
+            self.weight *= np.load(folder / "hard.npy")[self.chosen]
         self.weight /= self.weight.sum()
         self.cumulated = np.cumsum(self.weight)
 
@@ -45,17 +48,18 @@ class Cache:
 
 
 class Samples(torch.utils.data.Dataset):
-    """Item (n, side, mosaic, strength) is training image n. `shares` are the probabilities of the caches."""
+    """Item (n, side, mosaic, strength) is training image n. `shares` are the probabilities of the caches; `empty`: share
+    of the images with people that are reduced to a part without people."""
 
-    def __init__(self, caches, shares, seed):
-        self.caches, self.shares, self.seed = caches, np.cumsum(np.array(shares) / np.sum(shares)), seed
+    def __init__(self, caches, shares, seed, empty=0.5):
+        self.caches, self.shares, self.seed, self.empty = caches, np.cumsum(np.array(shares) / np.sum(shares)), seed, empty
 
     def __getitem__(self, item):
         number, side, mosaic, strength = item
         rng = np.random.default_rng([self.seed, number])
         # all parts of a mosaic come from one cache, so that one list of labelled classes is valid for the image
         cache = self.caches[min(int(np.searchsorted(self.shares, rng.random())), len(self.caches) - 1)]
-        image, boxes, ignored = augment.sample(rng, cache.draw, side, mosaic, strength)
+        image, boxes, ignored = augment.sample(rng, cache.draw, side, mosaic, strength, self.empty, cache.empty)
         targets = np.full((MOST_BOXES, 5), -1, np.float32)
         order = np.argsort(-(boxes[:, 3] - boxes[:, 1]) * (boxes[:, 4] - boxes[:, 2]), kind="stable")[:MOST_BOXES]
         targets[:len(order)] = boxes[order]

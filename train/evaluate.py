@@ -1,12 +1,13 @@
 """Evaluates several detectors with the same program.
 
-    python -m train.evaluate CACHE MODEL... [--data DATA] [--empty FOLDER] [--json FILE]
+    python -m train.evaluate CACHE MODEL... [--data DATA] [--empty FOLDER] [--rooms FOLDER...] [--json FILE]
 
 MODEL: a checkpoint (.pt) or an ONNX file with six raw maps (anchors from its metadata, else those of COCO; `person` must be one of
 its classes). On the held-out images of CACHE: AP50 of people, recall and precision at score 0.3, upright and rotated by 30, 60 and
 90 degrees to either side. With the folder of development data: how often all visible people are covered on
 labels/bonn_crowd_dev_100.json, and the number of false detections on tum_fr1_xyz_dev. With a folder of recordings without people
-(FOLDER/*/rgb): the number of detections there.
+(FOLDER/*/rgb): the number of detections there. With --rooms, photos without people (a folder of photos, or the held-out images of a
+cache of `train.cache empty`): the number of detections per 100 photos.
 """
 
 import argparse
@@ -130,7 +131,22 @@ def empty_recordings(network, folder, score=0.3):
             "frames_with_any": float((frames > 0).mean()), "worst_recording": float(max(means))}
 
 
-def report(network, cache, data, empty):
+def room_photos(path):
+    """Yields photos without people: those of a folder, or the held-out ones of a cache."""
+    if (path / "images.npy").exists():
+        cache = Cache(path, ["person"], held_out=True)
+        yield from (np.array(cache.images[index]) for index in cache.chosen)
+    else:
+        yield from (cv2.imread(str(file)) for file in sorted(path.iterdir()))
+
+
+def rooms(network, path, score=0.3):
+    """Returns the number of detections per 100 photos without people, and the share of photos with any."""
+    counts = np.array([int((network(image)[1] > score).sum()) for image in room_photos(path)])
+    return {"photos": len(counts), "false_per_100": float(100 * counts.mean()), "photos_with_any": float((counts > 0).mean())}
+
+
+def report(network, cache, data, empty, rooms_at=()):
     rows = {"upright": held_out(network, cache)}
     for angle in (30, 60, 90):
         rows[f"turned {angle}"] = held_out(network, cache, (-angle, angle))
@@ -139,6 +155,8 @@ def report(network, cache, data, empty):
         rows["tum_fr1_xyz_dev"] = false_alarms(network, data)
     if empty:
         rows["without people"] = empty_recordings(network, empty)
+    for path in rooms_at:
+        rows[f"rooms {path.name}"] = rooms(network, path)
     return rows
 
 
@@ -148,12 +166,13 @@ def main():
     parser.add_argument("models", type=pathlib.Path, nargs="+")
     parser.add_argument("--data", type=pathlib.Path, help="folder of development data, with rgbd/")
     parser.add_argument("--empty", type=pathlib.Path, help="folder of recordings without people, each with rgb/")
+    parser.add_argument("--rooms", type=pathlib.Path, nargs="+", default=[], help="folders or caches of photos without people")
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
     cache = Cache(options.cache, ["person"], held_out=True)
     everything = {}
     for path in options.models:
-        everything[path.name] = report(Network(path), cache, options.data, options.empty)
+        everything[path.name] = report(Network(path), cache, options.data, options.empty, options.rooms)
         print(path.name)
         for name, row in everything[path.name].items():
             print(f"  {name:16}", " ".join(f"{k} {v:.3f}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()), flush=True)

@@ -60,11 +60,11 @@ def halve(graph):
     graph.node.extend(casts + nodes)
 
 
-def shift(model, score):
+def shift(model, score, becomes=0.3):
     """Shifts the objectness so that `score` becomes 0.3; the order of detections, and with it AP, stays the same."""
     logit = lambda p: np.log(p / (1 - p))
     with torch.no_grad():
-        model.obj.bias += float(logit(0.3) - logit(score))
+        model.obj.bias += float(logit(becomes) - logit(score))
 
 
 def write(checkpoint, out, half, score=0.3):

@@ -71,11 +71,17 @@ def average(target, model, weight):
 
 
 def share_gradients(model, world):
-    grads = [p.grad for p in model.parameters()]
+    grads = [p.grad for p in model.parameters() if p.grad is not None]
     flat = torch.cat([g.flatten() for g in grads])
     dist.all_reduce(flat)
     for g, part in zip(grads, flat.split([g.numel() for g in grads])):
         g.copy_(part.view_as(g) / world)
+
+
+def freeze(model, parts):
+    """Keeps the weights of these parts of the network, and the statistics of their batch norms, as they are."""
+    for part in (model.get_submodule(name) for name in parts):
+        part.eval().requires_grad_(False)
 
 
 @torch.no_grad()
@@ -145,7 +151,7 @@ def train(rank, world, options):
 
     caches = [data.Cache(folder, config.classes) for folder in options.caches]
     held_out = data.Cache(options.caches[0], config.classes, held_out=True)
-    samples = data.Samples(caches, options.shares or [1] * len(caches), config.seed)
+    samples = data.Samples(caches, options.shares or [1] * len(caches), config.seed, config.empty)
     batches = Batches(config, seen, stop, options.side, rank, world)
 
     saved = told = time.time()
@@ -153,6 +159,7 @@ def train(rank, world, options):
     next_evaluation = seen + options.every
     for images, targets, ignored, labelled in data.loader(samples, batches, 1):
         model.train()
+        freeze(model, options.freeze)
         factor = rate(config, step, seen, decay)
         for group in optimizer.param_groups:
             group["lr"] = config.rate * factor
@@ -199,6 +206,7 @@ def main():
     parser.add_argument("--decay", type=int, default=0, help="samples over which the rate falls to 0")
     parser.add_argument("--side", type=int, nargs="+", help="sides of the training images, instead of those of the settings")
     parser.add_argument("--start", type=pathlib.Path, help="checkpoint to start from, instead of RUN/last.pt")
+    parser.add_argument("--freeze", nargs="+", default=[], metavar="PART", help="parts of train/model.py that do not change, for example `stem stage2`, which take half of the time")
     parser.add_argument("--name", help="file to write, instead of `last` or `final`")
     parser.add_argument("--every", type=int, default=16000, help="samples between evaluations")
     parser.add_argument("--processes", type=int, default=1, help="number of processes, each on one core; gradients are averaged")

@@ -2,6 +2,7 @@
 
     python -m train.grow crates/yfslam-detect/models/person.onnx RUN/last.pt RUNS/persons                        # for other classes
     python -m train.grow person.onnx RUN/last.pt RUNS/persons --widths 24 48 128 256 96                          # for a larger network
+    python -m train.grow crates/yfslam-detect/models/person.onnx RUN/last.pt RUNS/persons --as-0.3 0.395         # undoes the shift of the export
 
 SOURCE is a checkpoint or a file of train.export. The new network computes the same maps (Net2Net: Chen et al., ICLR 2016): new
 channels start at random, and the readers of old channels do not read them yet. The batch norms, which an exported file does not
@@ -20,7 +21,7 @@ from torch import nn
 
 from . import data
 from .config import Config
-from .export import fold, load
+from .export import fold, load, shift
 from .fit import save
 from .model import UNITS, YoloFastestV2
 
@@ -141,6 +142,7 @@ def main():
     parser.add_argument("out", type=pathlib.Path, help="the checkpoint from which train.fit continues")
     parser.add_argument("cache", type=pathlib.Path)
     parser.add_argument("--widths", type=int, nargs=5, help="channels of the stem, of the three stages, of the pyramid (default: unchanged)")
+    parser.add_argument("--as-0.3", dest="score", type=float, default=0.3, help="the option with which SOURCE was exported, to undo its shift")
     parser.add_argument("--seen", type=int, default=0, help="number of samples with which the source was trained; the training continues with later ones")
     options = parser.parse_args()
     weights, config = read(options.source)
@@ -157,6 +159,7 @@ def main():
         before = model(probe)
     settle(model, (pictures(options.seen + first).permute(0, 3, 1, 2).float() / 255 for first in range(0, 512, 32)))
     worst = max(float((a - b).detach().abs().max()) for a, b in zip(before, model(probe)))
+    shift(model, 0.3, options.score)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     save(options.out, model=model.state_dict(), mean=model.state_dict(), optimizer=None, step=0, seen=options.seen,
          config=dataclasses.asdict(config))

@@ -8,7 +8,7 @@ import types
 import numpy as np
 import torch
 
-from . import augment, cache, export, fit, grow
+from . import augment, cache, data, export, fit, grow
 from .config import Config
 from .decode import decode
 from .loss import assign, detection_loss, flatten, object_terms
@@ -96,7 +96,7 @@ def a_resumed_training_equals_an_uninterrupted_one():
             cache.cv2.imwrite(str(path), rng.integers(0, 256, (60, 80, 3), np.uint8))
             pictures.append((path, np.array([[0, 0.2, 0.1, 0.6, 0.9]])))
         cache.write(pictures, ["person"], folder / "cache", 0.3)
-        options = dict(caches=[folder / "cache"], shares=None, decay=0, side=[64], start=None, name=None, every=10**9, processes=1, set=["batch=4"])
+        options = dict(caches=[folder / "cache"], shares=None, decay=0, side=[64], start=None, name=None, every=10**9, processes=1, set=["batch=4"], freeze=["stem"])
         for run, parts in (("whole", [16]), ("parts", [8, 8])):
             (folder / run).mkdir()
             for samples in parts:
@@ -138,6 +138,29 @@ def a_grown_network_computes_what_the_exported_one_computes():
                 grow.fill(grown, weights, grow.places(config["widths"], widths))
                 grow.settle(grown, [torch.rand(8, 3, 96, 96)])
                 assert max(float((a - b).detach().abs().max()) for a, b in zip(wanted, grown(image))) < 1e-3, widths
+
+
+def a_shift_of_the_export_is_undone():
+    model = YoloFastestV2(1)
+    before = model.obj.bias.detach().clone()
+    export.shift(model, 0.395)
+    assert (before - model.obj.bias > 0.4).all()
+    export.shift(model, 0.3, 0.395)
+    assert torch.allclose(before, model.obj.bias, atol=1e-6)
+
+
+def hard_photos_of_rooms_are_drawn_more_often_and_have_no_boxes():
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        rng = np.random.default_rng(0)
+        for index in range(3):
+            cache.cv2.imwrite(str(folder / f"{index}.png"), rng.integers(0, 256, (60, 80, 3), np.uint8))
+        cache.write(cache.empty_folder(folder, ["person"]), ["person"], folder / "cache", 0.0)
+        np.save(folder / "cache/hard.npy", np.array([1.0, 1.0, 3.0]))
+        photos = data.Cache(folder / "cache", ["person"])
+        assert photos.empty and np.allclose(photos.weight, [0.2, 0.2, 0.6])
+        samples = data.Samples([photos], [1], 1)
+        assert all((samples[n, 96, 0.5, 1.0][1] == -1).all() for n in range(20))
 
 
 def a_person_is_cut_by_an_upright_edge():
