@@ -19,6 +19,9 @@ const ROLLING_SIGMAS: f64 = 4.0;
 /// Standard deviations within which it is that of a global shutter.
 const GLOBAL_SIGMAS: f64 = 2.0;
 
+/// Frames for which memory is reserved.
+const FRAMES: usize = 2048;
+
 /// How the readout time of the rows of an image is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -39,7 +42,7 @@ pub struct Readout {
 }
 
 /// The estimate of the readout time while it is under way.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct ReadoutSearch {
     pub(super) estimator: ReadoutEstimator,
     round: usize,
@@ -47,6 +50,13 @@ pub(super) struct ReadoutSearch {
     depth_residuals: (f64, usize),
     /// Time stamps, ns, of the frames so far, and how the pose of each, relative to its keyframe, changes with the readout time.
     pose_changes: Vec<(i64, Vector6<f64>)>,
+}
+
+impl Default for ReadoutSearch {
+    fn default() -> Self {
+        let pose_changes = Vec::with_capacity(FRAMES);
+        Self { estimator: ReadoutEstimator::default(), round: 0, depth_residuals: (0.0, 0), pose_changes }
+    }
 }
 
 impl Slam {

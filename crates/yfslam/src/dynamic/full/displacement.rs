@@ -79,6 +79,8 @@ impl Comparison {
 #[derive(Clone, Debug, Default)]
 pub(super) struct EarlierFrames {
     frames: VecDeque<Earlier>,
+    /// Frames whose memory is allocated at the start, so that later frames allocate none.
+    spare: Vec<Earlier>,
     /// The features of the current frame, until its final pose is known, and its time stamp, ns.
     kept: FrameFeatures,
     kept_ns: Option<i64>,
@@ -90,6 +92,14 @@ impl EarlierFrames {
     /// Keeps the features of the frame for later ones, if the last inserted frame is old enough.
     pub(super) fn keep(&mut self, config: &FullConfig, timestamp_ns: i64, features: &FrameFeatures) {
         let is_due = |last: &Earlier| seconds(last.timestamp_ns, timestamp_ns) >= config.displacement_spacing_s;
+        if self.frames.is_empty() && self.spare.is_empty() {
+            self.frames.reserve(config.displacement_frames);
+            self.spare.resize_with(config.displacement_frames, || {
+                let mut spare = Earlier::default();
+                spare.features.copy_from(features);
+                spare
+            });
+        }
         if self.frames.back().is_none_or(is_due) {
             self.kept_ns = Some(timestamp_ns);
             self.kept.copy_from(features);
@@ -102,7 +112,7 @@ impl EarlierFrames {
             return;
         }
         let oldest = if self.frames.len() >= config.displacement_frames { self.frames.pop_front() } else { None };
-        let mut frame = oldest.unwrap_or_default();
+        let mut frame = oldest.or_else(|| self.spare.pop()).unwrap_or_default();
         (frame.timestamp_ns, frame.relative_pose) = (timestamp_ns, Some(relative_pose));
         std::mem::swap(&mut frame.features, &mut self.kept);
         self.frames.push_back(frame);
@@ -110,7 +120,8 @@ impl EarlierFrames {
 
     /// Removes all frames.
     pub(super) fn clear(&mut self) {
-        self.frames.clear();
+        self.spare.extend(self.frames.drain(..));
+        self.kept_ns = None;
     }
 
     /// Looks for the features of the frame in earlier ones; `track_of` returns on the instance of which track, below `tracks`, a position of
