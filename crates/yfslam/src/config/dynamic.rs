@@ -41,11 +41,11 @@ config_section! {
         /// The depth difference up to which neighbouring moving cells belong to the same object.
         /// Source: chosen: the depth of a person, twice NGD-SLAM's 0.33.
         history_cluster_step_m: f32 = 0.66, in 0.0..=10.0, "m";
-        /// The number of earlier frames of which the oldest shows whether an instance has moved.
-        /// Source: chosen: with the spacing, the last half second, in which people who walk have left their place.
+        /// The number of earlier frames in which the features of an instance are looked for, to learn whether it has moved.
+        /// Source: chosen: with the spacing, the last two seconds, in which also people who sway have left their place.
         displacement_frames: usize = 8, in 1..=100, "frames";
         /// The smallest time between two of these frames.
-        /// Source: chosen: see `displacement_frames`.
+        /// Source: chosen: the time of a slow step.
         displacement_spacing_s: f64 = 0.25, in 0.0..=60.0, "s";
         /// The distance from the camera up to which such a frame is compared.
         /// Source: chosen: farther away, features look different.

@@ -15,7 +15,8 @@ const MIN_PRIOR_LOG_ODDS: f32 = 0.5;
 const MOVED_LOG_ODDS: f32 = 0.85;
 /// Change by a frame in which it is where it was [`FULL_GAP_S`] before. Source: as [`MOVED_LOG_ODDS`].
 const STILL_LOG_ODDS: f32 = 0.85;
-/// Most that its features can show. Source: the log-odds of [`MAX_PROBABILITY`].
+/// Most that its features can show. Source: chosen: less than the log-odds of [`MAX_PROBABILITY`], so that a person of whom the detector is
+/// certain is not used even while sitting: small motions of a body show late.
 const MAX_EVIDENCE: f32 = 3.0;
 /// Time in which a movable object that moves has left its place, s. Source: chosen: a slow step.
 const FULL_GAP_S: f32 = 0.3;

@@ -1,10 +1,13 @@
-//! Whether an instance is where it was: its features are looked for in a frame of half a second before.
+//! Whether an instance is where it was: its features are looked for in a frame of a quarter of a second before, and in the oldest frame of
+//! the last seconds that was taken from nearby.
 //!
 //! In: the features of a frame with its first pose, and which instance each lies on. Out: for each instance, how many of its features the
-//! earlier frame shows at the place that they have now. The features beside all instances give the share to compare with: it says how well
+//! earlier frames show at the place that they have now. The features beside all instances give the share to compare with: it says how well
 //! features are found again in these images if nothing moves.
 
 use std::collections::VecDeque;
+
+use fearless_simd::{Level, Simd, dispatch};
 
 use crate::config::FullConfig;
 use crate::context::SensorModel;
@@ -12,7 +15,6 @@ use crate::dynamic::FirstPose;
 use crate::features::{Descriptor, Feature, FrameFeatures};
 use crate::geometry::Pose;
 use crate::map::KeyframeRelativePose;
-use fearless_simd::{Level, Simd, dispatch};
 
 /// Every n-th feature beside the instances is looked for: enough for the share of those that are found.
 const BACKGROUND_STEP: usize = 3;
