@@ -169,7 +169,7 @@ impl FaultInjector {
                 }
                 FaultKind::FalseBoxes => {
                     let boxes = self.false_boxes.next(frame.color.width(), frame.color.height());
-                    frame.detections.get_or_insert_default().extend(boxes);
+                    frame.detections.get_or_insert_default().extend_from_slice(boxes);
                 }
             }
         }
