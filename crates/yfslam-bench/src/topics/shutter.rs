@@ -151,10 +151,10 @@ fn page(records: &[&Record]) -> Result<String> {
          Five starts (frames 0, 5, …, 20 of the playing), median, least and greatest. *Live* are the poses as they were known at the time of \
          each frame.\n\n{}\n\
          ## Rendered worlds\n\n\
-         400 × 300 px, 150 frames, a readout of {READOUT_MS} ms for colour and depth; ATE in metres, median of {SEEDS} worlds each. Without \
+         400 × 300 px, 150 frames, a readout of {READOUT_MS} ms for colour and depth; ATE in metres, median of up to {SEEDS} worlds each. Without \
          people the method is `none`, with people `full`.\n\n{}\n\
          ## Estimates of the readout time\n\n\
-         Rendered worlds of `{}` without people, 400 × 300 px, 150 frames, {} seeds for each readout time. The program uses an estimate only \
+         Rendered worlds of `{}` without people, 400 × 300 px, 150 frames, up to {} seeds for each readout time. The program uses an estimate only \
          where it is certain.\n\n{}",
         recordings_table(records),
         worlds_table(records),
