@@ -105,7 +105,7 @@ impl Track {
     /// Takes into account which share of its features, relative to that of the background, is where it was `gap_s` seconds before.
     pub(crate) fn add_evidence(&mut self, config: &FullConfig, share: f32, gap_s: f32) {
         if share < config.moving_share || share * config.moving_share > 1.0 {
-            // What begins to move is dropped in the same frame. If the background seems to move, the pose follows the instance.
+            // Whatever it has shown before, what moves now counts as moving at once. If the background seems to move, the pose follows the instance.
             self.evidence = (self.evidence.max(0.0) + MOVED_LOG_ODDS).min(MAX_EVIDENCE);
         } else if share >= config.still_share {
             let weight = (gap_s / FULL_GAP_S).min(1.0);
@@ -199,7 +199,7 @@ mod tests {
         assert!(track_after(0.5, &[1.0; 3]).stands_still());
         assert!(track_after(0.5, &[1.0; 30]).static_probability() > 0.9);
         let moves = track_after(0.5, &[&[1.0; 30][..], &[0.1]].concat());
-        assert!(!moves.stands_still() && moves.is_proven(), "the same frame");
+        assert!(!moves.stands_still() && moves.is_proven(), "at once");
     }
 
     #[test]
