@@ -119,6 +119,13 @@ impl Full {
         }
     }
 
+    /// Returns whether a pixel of the raw image belongs to an instance that moves; also if it was released before the pose of this frame
+    /// was known.
+    fn is_on_moving_track(&self, raw: [f32; 2]) -> bool {
+        let track = self.tracked.instance_at(raw).and_then(|t| self.tracks.list.get(t));
+        track.is_some_and(|track| track.is_proven() && !track.stands_still())
+    }
+
     /// Removes segmented cells that are unchanged with respect to the depth history, whatever the boxes say. A track without a
     /// detection ends if most of its cells are unchanged.
     fn clear_static(&mut self, config: &DynamicConfig) {
@@ -198,7 +205,7 @@ impl DynamicFilter for Full {
         let mut trusted: usize = features.features.iter().filter(|f| f.trust > 0.0).count();
         for f in &mut features.features {
             let edge_px = config.full.edge_px * first.sensor.scale(f.octave);
-            let moves = self.segmenter.instances.covers(f.raw, edge_px);
+            let moves = self.segmenter.instances.covers(f.raw, edge_px) || self.is_on_moving_track(f.raw);
             if f.trust == 0.0 && !moves {
                 f.trust = 1.0;
                 trusted += 1;
@@ -214,7 +221,10 @@ impl DynamicFilter for Full {
     }
 
     fn doubt_boxes(&mut self, config: &DynamicConfig, features: &mut FrameFeatures) -> bool {
-        (0..self.tracks.list.len()).for_each(|track| self.segmenter.instances.clear_track(track));
+        for track in 0..self.tracks.list.len() {
+            self.segmenter.instances.clear_track(track);
+            self.tracked.clear_track(track);
+        }
         let mut any = false;
         for f in features.features.iter_mut().filter(|f| f.trust == 0.0 && !self.segmenter.instances.covers(f.raw, 0.0))
         {
@@ -259,6 +269,7 @@ mod tests {
     use crate::config::Config;
     use crate::context::SensorModel;
     use crate::detect::{BoundingBox, Detection};
+    use crate::features::{Descriptor, Feature};
     use crate::image::{DepthImage, Image};
     use crate::map::Map;
 
@@ -272,6 +283,48 @@ mod tests {
             (100..400).for_each(|y| raw.row_mut(y)[200..300].fill(11_250));
         }
         DepthImage { raw, metres_per_unit: 1.0 / 5000.0 }
+    }
+
+    #[test]
+    fn a_still_instance_that_starts_to_move_is_dropped_in_the_same_frame() {
+        let (camera, settings) = (Camera::pinhole(640, 480, 520.0, 520.0, 320.0, 240.0), Config::default());
+        let config = &settings.dynamic;
+        let sensor = SensorModel::new(&camera, &settings, &[1.0]);
+        let mut map = Map::default();
+        map.insert_keyframe(0, Isometry3::identity(), FrameFeatures::default());
+        let first = FirstPose { timestamp_ns: 0, sensor: &sensor, map: &map, t_cam_world: &Isometry3::identity() };
+        // Enough features on the wall, and one on the person.
+        let feature = |raw: [f32; 2], depth_m: f32| Feature {
+            raw,
+            u: raw[0],
+            v: raw[1],
+            octave: 0,
+            angle_rad: 0.0,
+            depth_m: Some(depth_m),
+            trust: 1.0,
+        };
+        let wall = (0..600).map(|i| feature([400.0 + (i % 30) as f32 * 5.0, 20.0 + (i / 30) as f32 * 10.0], 2.4));
+        let all: Vec<Feature> = std::iter::once(feature([250.0, 250.0], 2.25)).chain(wall).collect();
+        let descriptors = vec![Descriptor::default(); all.len()];
+        let detection = Detection { class: 0, score: 0.6, bbox: BOX };
+        let (depth, gray) = (room(true), Image::new(640, 480));
+        let mut full = Full::default();
+        let mut frame = |full: &mut Full, share: f32| {
+            let mut features = FrameFeatures::from_parts(all.clone(), descriptors.clone(), sensor.bounds);
+            let movable = &[detection];
+            let input =
+                FilterInput { movable, detected: true, mask: None, gray: &gray, depth: &depth, sensor: &sensor };
+            full.before_pose(config, &input, &mut features);
+            let before = features.features[0].trust;
+            full.tracks.list[0].add_evidence(&config.full, share, 0.4);
+            full.after_pose(config, &first, &mut features);
+            [before, features.features[0].trust]
+        };
+        assert_eq!(frame(&mut full, 0.5), [0.0; 2], "a box is believed at first");
+        (0..10).for_each(|_| drop(frame(&mut full, 1.0)));
+        assert!(frame(&mut full, 1.0).into_iter().all(|trust| trust > 0.8), "it stands still");
+        let [before, after] = frame(&mut full, 0.0);
+        assert!(before > 0.8 && after == 0.0, "it starts to move");
     }
 
     #[test]
