@@ -81,8 +81,8 @@ mod world;
 
 pub use actors::CLASS_NAMES;
 pub use config::{
-    Activity, ActorsConfig, CameraMotion, CarriedObject, LightConfig, MAX_PEOPLE, SceneKind, SensorConfig, WorldConfig,
-    WorldError, default_camera,
+    Activity, ActorsConfig, CameraMotion, CarriedObject, LightConfig, MAX_PEOPLE, SceneKind, SensorConfig,
+    UnknownObject, WorldConfig, WorldError, default_camera,
 };
 pub use spec::{is_spec, parse, parse_with_camera, split};
 pub use suite::{NamedWorld, SUITE, names};

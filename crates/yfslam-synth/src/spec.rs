@@ -5,7 +5,8 @@
 use yfslam::Camera;
 
 use crate::config::{
-    Activity, CameraMotion, CarriedObject, SceneKind, SensorConfig, WorldConfig, WorldError, default_camera,
+    Activity, CameraMotion, CarriedObject, SceneKind, SensorConfig, UnknownObject, WorldConfig, WorldError,
+    default_camera,
 };
 use crate::suite::{DEFAULT_NAME, find, names};
 
@@ -21,6 +22,8 @@ const KEYS: &[(&str, &str)] = &[
     ("carry", "on or off: a person carries an object, puts it down and fetches it"),
     ("object", "box or laptop: the carried object"),
     ("moved", "on or off: a box is displaced while out of view"),
+    ("unknown", "box, large_box, laptop, door or wall: an object that no detector knows moves without a person"),
+    ("unknown_moves", "on or off: off leaves that object at its first place"),
     ("frames", "number of frames"),
     ("share", "share of the view that people cover, 0 to 0.8"),
     ("width", "px"),
@@ -122,6 +125,8 @@ fn set(config: &mut WorldConfig, key: &str, value: &str) -> Result<(), String> {
         "carry" => config.actors.carried_box = switch(key, value)?,
         "object" => config.actors.carried_object = one_of(key, value, &CarriedObject::ALL)?,
         "moved" => config.actors.moved_object = switch(key, value)?,
+        "unknown" => config.actors.unknown = Some(one_of(key, value, &UnknownObject::ALL)?),
+        "unknown_moves" => config.actors.unknown_moves = switch(key, value)?,
         "frames" => config.frames = number(key, value)?,
         "share" => config.person_share = number(key, value)?,
         // The view stays the same when the size changes: the intrinsics scale about the corner of the pixel grid.
@@ -279,8 +284,14 @@ mod tests {
     fn a_spec_says_what_moves() {
         let config = parse("walking_xyz?people=3&robots=2&chair=on&carry=on&moved=on&share=0.8").unwrap();
         let carried_object = CarriedObject::Box;
-        let actors =
-            ActorsConfig { robots: 2, pushed_chair: true, carried_box: true, carried_object, moved_object: true };
+        let actors = ActorsConfig {
+            robots: 2,
+            pushed_chair: true,
+            carried_box: true,
+            carried_object,
+            moved_object: true,
+            ..ActorsConfig::default()
+        };
         assert_eq!((config.actors, config.person_share), (actors, 0.8));
         assert_eq!(parse("carried_box?object=laptop").unwrap().actors.carried_object, CarriedObject::Laptop);
         assert!(message("walking_xyz?object=laptop").contains("unless `carried_box` is on"));

@@ -3,7 +3,7 @@
 //! In: a name. Out: the differences from [`WorldConfig::default`]. The eight `sitting_*` and `walking_*` follow the freiburg3
 //! sequences of the TUM RGB-D benchmark (Sturm et al., IROS 2012).
 
-use crate::config::{Activity, CameraMotion, SceneKind, WorldConfig};
+use crate::config::{Activity, CameraMotion, SceneKind, UnknownObject, WorldConfig};
 
 /// A world of the suite.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +88,44 @@ pub const SUITE: &[NamedWorld] = &[
             (c.light.exposure, c.light.flicker) = (0.5, 0.6);
         },
     ),
+    world(
+        "nonobstructing_box",
+        "a box that no detector knows crosses the view; the camera moves along its axes",
+        |c| {
+            unknown(c, CameraMotion::Xyz, UnknownObject::Box);
+        },
+    ),
+    world(
+        "obstructing_box",
+        "a large box comes close to the camera and covers most of the view; the camera moves",
+        |c| {
+            unknown(c, CameraMotion::Xyz, UnknownObject::LargeBox);
+        },
+    ),
+    world(
+        "handed_laptop",
+        "a laptop is handed from left to right before the camera, which moves on a half sphere",
+        |c| {
+            unknown(c, CameraMotion::Halfsphere, UnknownObject::Laptop);
+        },
+    ),
+    world("opening_door", "a door opens and is closed; the camera moves along its three axes", |c| {
+        unknown(c, CameraMotion::Xyz, UnknownObject::Door);
+    }),
+    world(
+        "moving_wall",
+        "a partition wall that covers three fifths of the view is rolled aside and back; the camera moves",
+        |c| {
+            unknown(c, CameraMotion::Xyz, UnknownObject::Wall);
+        },
+    ),
 ];
+
+/// An object moves, and nobody is there.
+fn unknown(config: &mut WorldConfig, motion: CameraMotion, object: UnknownObject) {
+    (config.motion, config.people, config.person_share) = (motion, 0, 0.0);
+    config.actors.unknown = Some(object);
+}
 
 fn sitting(config: &mut WorldConfig, motion: CameraMotion) {
     (config.activity, config.motion) = (Activity::Sitting, motion);

@@ -1,7 +1,7 @@
 //! All that moves: people, robots, and objects that are pushed, carried or displaced.
 //!
 //! In: a scene, a configuration and a seed. Out: at any time, the poses and meshes of all actors and the spheres that darken their
-//! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried object, displaced box. Objects that
+//! surroundings. Actors are numbered from 1 in the order people, robots, pushed chair, carried object, displaced box, unknown object. Objects that
 //! are never moved (desks, the chairs of the scene) are not actors.
 
 pub mod displaced;
@@ -12,6 +12,7 @@ pub mod routes;
 #[allow(clippy::unwrap_used, reason = "a test may")]
 mod tests;
 pub mod tour_walker;
+mod unknown;
 pub mod walkway;
 
 use nalgebra::Isometry3;
@@ -30,9 +31,10 @@ use people::tasks::{self, Task};
 use people::{Person, Plan, upright};
 use rigid_actor::RigidActor;
 use routes::{Route, route};
+use unknown::UnknownMotion;
 
 /// Names of the classes of actors, by the class of the boxes and detections of a [`SynthFrame`](crate::SynthFrame).
-pub const CLASS_NAMES: [&str; 5] = ["person", "robot", "chair", "box", "laptop"];
+pub const CLASS_NAMES: [&str; 7] = ["person", "robot", "chair", "box", "laptop", "door", "wall"];
 
 /// Class of an actor; the value is the index into [`CLASS_NAMES`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +44,8 @@ pub enum Class {
     Chair,
     Box,
     Laptop,
+    Door,
+    Wall,
 }
 
 /// Motion of a rigid actor.
@@ -51,6 +55,7 @@ enum Motion {
     /// Pushed or carried by the person with this index.
     Handled(usize),
     Displaced(DisplacedBox),
+    Unknown(UnknownMotion),
 }
 
 /// All actors of a scene.
@@ -101,6 +106,12 @@ impl Actors {
             let displaced = DisplacedBox::new(scene, config, path);
             actors.add(Motion::Displaced(displaced), |instance| {
                 RigidActor::cardboard(instance, &mut scene.palette, displaced::BOX_M.into(), config.seed ^ 0xb)
+            });
+        }
+        if let Some(object) = wanted.unknown {
+            let motion = UnknownMotion::new(object, &scene.camera, wanted.unknown_moves);
+            actors.add(Motion::Unknown(motion), |instance| {
+                RigidActor::unknown(object, instance, &mut scene.palette, config.seed)
             });
         }
         actors.rigged()
@@ -186,6 +197,7 @@ impl Actors {
                 _ => return None,
             },
             Motion::Displaced(displaced) => displaced.at(time),
+            Motion::Unknown(motion) => motion.at(time),
         })
     }
 

@@ -8,6 +8,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::{Isometry3, Point3, UnitQuaternion};
 
 use super::Class;
+use crate::config::UnknownObject;
 use crate::light::Occluder;
 use crate::mesh::{Lighting, Mesh, Vec3};
 use crate::rig::Rig;
@@ -85,6 +86,28 @@ impl RigidActor {
         })
     }
 
+    /// Builds an object that no person detector knows.
+    pub fn unknown(object: UnknownObject, instance: u8, palette: &mut Palette, seed: u64) -> Self {
+        match object {
+            UnknownObject::Box => Self::cardboard(instance, palette, Vec3::new(0.45, 0.35, 0.35), seed),
+            UnknownObject::LargeBox => Self::cardboard(instance, palette, Vec3::new(0.95, 0.45, 0.80), seed),
+            UnknownObject::Laptop => Self::laptop(instance, palette, Vec3::new(0.36, 0.25, 0.02), seed),
+            UnknownObject::Door => Self::build(Class::Door, instance, palette, seed, Vec::new(), |b| {
+                // The hinge is at the left edge.
+                let wood = b.rng.pick([[0.52, 0.34, 0.20], [0.66, 0.50, 0.32], [0.40, 0.30, 0.24]]);
+                b.cuboid(Vec3::new(0.45, 0.0, 0.0), Vec3::new(0.90, 0.04, 2.0), 0.0, |_| Material::Wood(wood));
+                poster(b, Vec3::new(0.45, -0.021, 1.05), [0.42, 0.60]);
+                b.cuboid(Vec3::new(0.83, -0.045, 1.02), Vec3::new(0.12, 0.03, 0.03), 0.0, |_| Material::Plain(STEEL));
+            }),
+            UnknownObject::Wall => Self::build(Class::Wall, instance, palette, seed, Vec::new(), |b| {
+                b.cuboid(Vec3::z() * 0.011, Vec3::new(1.7, 0.05, 1.4), 0.0, |_| Material::Plaster([0.60, 0.64, 0.68]));
+                for (x, z) in [(-0.60, 0.80), (-0.05, 0.95), (0.50, 0.75), (-0.35, 0.18), (0.35, 0.12)] {
+                    poster(b, Vec3::new(x, -0.026, z), [0.36, 0.50]);
+                }
+            }),
+        }
+    }
+
     /// Builds a mesh with the scene builder and turns it into an actor.
     fn build(
         class: Class,
@@ -122,6 +145,12 @@ impl RigidActor {
 
 fn ball(x: f32, y: f32, z: f32, radius: f32) -> Occluder {
     Occluder { center: Vec3::new(x, y, z), radius }
+}
+
+/// Adds a poster on a surface that faces the front; `bottom` is the middle of its lower edge.
+fn poster(b: &mut Builder, bottom: Vec3, [width, height]: [f32; 2]) {
+    let corner = bottom + Vec3::new(-width / 2.0, 0.0, height);
+    b.rectangle(corner, Vec3::x() * width, Vec3::z() * -height, Material::Poster);
 }
 
 fn robot(b: &mut Builder, paint: [f32; 3]) {

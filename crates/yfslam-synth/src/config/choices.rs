@@ -89,3 +89,30 @@ impl CarriedObject {
     /// All objects with their names in specs.
     pub const ALL: [(&str, Self); 2] = [("box", Self::Box), ("laptop", Self::Laptop)];
 }
+
+/// An object that no person detector knows and that moves without a person.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UnknownObject {
+    /// A cardboard box of 45 cm × 35 cm × 35 cm crosses the view.
+    Box,
+    /// A cardboard box of 95 cm × 45 cm × 80 cm comes close, covers most of the view, and leaves.
+    LargeBox,
+    /// An open laptop is handed from the left to the right, close to the camera.
+    Laptop,
+    /// A door of 90 cm × 2 m opens and is closed.
+    Door,
+    /// A partition wall of 1.7 m × 1.4 m, which covers three fifths of the view, is rolled aside and back.
+    Wall,
+}
+
+impl UnknownObject {
+    /// All objects with their names in specs.
+    pub const ALL: [(&str, Self); 5] = [
+        ("box", Self::Box),
+        ("large_box", Self::LargeBox),
+        ("laptop", Self::Laptop),
+        ("door", Self::Door),
+        ("wall", Self::Wall),
+    ];
+}

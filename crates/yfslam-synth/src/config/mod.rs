@@ -9,7 +9,7 @@ mod validate;
 use serde::{Deserialize, Serialize};
 use yfslam::Camera;
 
-pub use choices::{Activity, CameraMotion, CarriedObject, SceneKind};
+pub use choices::{Activity, CameraMotion, CarriedObject, SceneKind, UnknownObject};
 pub use error::WorldError;
 pub use light::LightConfig;
 pub use sensor::SensorConfig;
@@ -85,7 +85,7 @@ impl Default for WorldConfig {
 }
 
 /// Moving objects other than people. Each is an actor with a number of its own; see [`CLASS_NAMES`](crate::CLASS_NAMES).
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ActorsConfig {
     /// Number of rescue robots that drive among the people; at most 6 together with the people.
@@ -99,6 +99,24 @@ pub struct ActorsConfig {
     /// Whether a box is displaced while it and its new place are outside the view of the camera. If that never happens within the
     /// sequence, it stays where it is.
     pub moved_object: bool,
+    /// An object that no person detector knows and that moves without a person; `None` for none.
+    pub unknown: Option<UnknownObject>,
+    /// Whether that object moves; else it stays at its first place, which is the reference for a comparison.
+    pub unknown_moves: bool,
+}
+
+impl Default for ActorsConfig {
+    fn default() -> Self {
+        Self {
+            robots: 0,
+            pushed_chair: false,
+            carried_box: false,
+            carried_object: CarriedObject::Box,
+            moved_object: false,
+            unknown: None,
+            unknown_moves: true,
+        }
+    }
 }
 
 /// Returns the calibration of freiburg3 from the web page of the TUM benchmark, which has no distortion.

@@ -68,6 +68,12 @@ config_section! {
         /// The same share below which an instance moves.
         /// Source: chosen: half of `still_share`.
         moving_share: f32 = 0.3, in 0.0..=1.0;
+        /// The distance from its place within which a feature that is not there is looked for in the earlier frame, in pixels.
+        /// Source: chosen: in a quarter of a second, an object 1.5 m away that moves by 0.9 m/s.
+        second_motion_px: f32 = 80.0, in 1.0..=1000.0, "px";
+        /// The number of features that must move together to count as an object that no detector knows.
+        /// Source: chosen: fewer move together by chance.
+        second_motion_min_features: usize = 12, in 4..=100_000, "features";
         /// The share of the image from which on a person mask is doubted as long as it has not moved.
         /// Source: chosen: a mask that covers most of the image is often false, and leaves too little for a pose.
         max_unproven_share: f32 = 0.5, in 0.0..=1.0;

@@ -88,6 +88,12 @@ pub trait DynamicFilter: Send + Sync {
         false
     }
 
+    /// Returns the pose of the frame, world to camera, if [`after_pose`](Self::after_pose) has found that the first pose followed an object that
+    /// moves. The frame is then matched with the map anew from there.
+    fn corrected_pose(&self) -> Option<Pose> {
+        None
+    }
+
     /// Gives the trust `dynamic.full.doubted_box_trust` to features that only a bounding box excludes. Called when too few trusted features
     /// remain to track the frame, or when the camera is lost and recognises nothing; the frame is then tried again. Returns whether the trust
     /// of any feature has changed.

@@ -18,6 +18,8 @@ const STILL_LOG_ODDS: f32 = 0.85;
 /// Most that its features can show. Source: chosen: less than the log-odds of [`MAX_PROBABILITY`], so that a person of whom the detector is
 /// certain is not used even while sitting: small motions of a body show late.
 const MAX_EVIDENCE: f32 = 3.0;
+/// Score of an object that no detector has found.
+const UNKNOWN_SCORE: f32 = 0.5;
 /// Time in which a movable object that moves has left its place, s. Source: chosen: a slow step.
 const FULL_GAP_S: f32 = 0.3;
 
@@ -36,6 +38,8 @@ pub(crate) struct Track {
     pub depth_age: usize,
     /// Whether it was found to show no object; the next update removes it.
     pub ended: bool,
+    /// Whether it is an object that no detector has found: it was opened because it moves, and ends when it stands still.
+    pub is_unknown: bool,
     /// Highest score of its detections.
     best_score: f32,
     /// Log-odds that it moves by what its features have shown.
@@ -64,15 +68,34 @@ impl Track {
             velocity: [0.0; 2],
             extent: Extent::default(),
             occluded: false,
+            is_unknown: false,
             best_score: detection.score,
             evidence: 0.0,
         }
+    }
+
+    /// Opens a track for an object that no detector has found, and that moves.
+    pub(super) fn open_unknown(bbox: BoundingBox, depth_m: f32) -> Self {
+        let track = Self::open(&Detection { class: 0, score: UNKNOWN_SCORE, bbox });
+        let evidence = 2.0 * MOVED_LOG_ODDS;
+        Self { misses: 1, depth_m: Some(depth_m), is_unknown: true, evidence, ..track }
+    }
+
+    /// Continues the track of an unknown object that was seen to move.
+    pub(super) fn move_unknown(&mut self, bbox: BoundingBox, depth_m: f32) {
+        let (from, to) = (center(&self.bbox), center(&bbox));
+        for axis in 0..2 {
+            self.velocity[axis] += 0.5 * (to[axis] - from[axis]);
+        }
+        (self.bbox, self.depth_m, self.misses) = (bbox, Some(depth_m), 1);
+        self.extent = Extent::default();
     }
 
     /// Moves the box by the velocity, for a frame without a detection so far.
     pub(super) fn predict(&mut self) {
         self.misses += 1;
         self.depth_age += 1;
+        self.missed_searches += usize::from(self.is_unknown);
         self.bbox = shifted(&self.bbox, self.velocity);
     }
 
@@ -107,6 +130,7 @@ impl Track {
         if share < config.moving_share || share * config.moving_share > 1.0 {
             // Whatever it has shown before, what moves now counts as moving at once. If the background seems to move, the pose follows the instance.
             self.evidence = (self.evidence.max(0.0) + MOVED_LOG_ODDS).min(MAX_EVIDENCE);
+            self.missed_searches *= usize::from(!self.is_unknown);
         } else if share >= config.still_share {
             let weight = (gap_s / FULL_GAP_S).min(1.0);
             self.evidence = (self.evidence - STILL_LOG_ODDS * weight).max(-MAX_EVIDENCE);
@@ -168,6 +192,7 @@ impl Track {
         self.misses = 0;
         self.depth_age = 0;
         self.missed_searches = 0;
+        self.is_unknown = false;
     }
 }
 

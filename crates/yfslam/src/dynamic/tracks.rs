@@ -8,6 +8,11 @@ use crate::config::DynamicConfig;
 use crate::detect::{BoundingBox, Detection};
 use crate::dynamic::track::Track;
 
+/// Overlap from which on a moving object that no detector has found is that of a track. Source: chosen: half.
+const SAME_UNKNOWN: f32 = 0.5;
+/// Frames after which the track of such an object ends if nothing shows that it moves. Source: chosen: one second.
+const MAX_UNKNOWN_FRAMES: usize = 30;
+
 /// All tracks, in the order in which they were opened.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tracks {
@@ -32,7 +37,7 @@ impl Tracks {
         [width, height]: [usize; 2],
     ) {
         self.predict([width, height]);
-        self.list.iter_mut().for_each(|track| track.missed_searches += 1);
+        self.list.iter_mut().for_each(|track| track.missed_searches += usize::from(!track.is_unknown));
         // Pairs in descending order of overlap; the indices break ties.
         self.pairs.clear();
         for (t, track) in self.list.iter().enumerate() {
@@ -86,13 +91,43 @@ impl Tracks {
         true
     }
 
+    /// Opens or continues the track of an object that no detector has found, and that was seen to move. Returns its index, and the track as it was
+    /// before.
+    pub(crate) fn move_unknown(&mut self, bbox: BoundingBox, depth_m: f32) -> (usize, Option<Track>) {
+        let is_same = |track: &Track| track.is_unknown && !track.ended && overlap(&track.bbox, &bbox) >= SAME_UNKNOWN;
+        if let Some(t) = self.list.iter().position(is_same) {
+            let before = self.list[t];
+            self.list[t].move_unknown(bbox, depth_m);
+            return (t, Some(before));
+        }
+        self.list.push(Track::open_unknown(bbox, depth_m));
+        (self.list.len() - 1, None)
+    }
+
+    /// Takes back [`Self::move_unknown`]: nothing moves there.
+    pub(crate) fn restore_unknown(&mut self, t: usize, before: Option<Track>) {
+        match before {
+            Some(before) => self.list[t] = before,
+            None => self.list[t].ended = true,
+        }
+    }
+
     /// Predicts the tracks for the next frame by their velocity. On its own it serves frames that no detector has processed: tracks
     /// then continue without limit.
     pub(crate) fn predict(&mut self, [width, height]: [usize; 2]) {
         let image = BoundingBox { x_min: 0.0, y_min: 0.0, x_max: width as f32, y_max: height as f32 };
         self.list.iter_mut().for_each(Track::predict);
         self.list.retain(|track| !track.ended && track.bbox.iou(&image) > 0.0);
+        self.list.retain(|track| !track.is_unknown || track.missed_searches <= MAX_UNKNOWN_FRAMES);
     }
+}
+
+/// Returns the share of the smaller box that the other one covers.
+fn overlap(a: &BoundingBox, b: &BoundingBox) -> f32 {
+    let side = |a: [f32; 2], b: [f32; 2]| (a[1].min(b[1]) - a[0].max(b[0])).max(0.0);
+    let area = |b: &BoundingBox| (b.x_max - b.x_min) * (b.y_max - b.y_min);
+    let common = side([a.x_min, a.x_max], [b.x_min, b.x_max]) * side([a.y_min, a.y_max], [b.y_min, b.y_max]);
+    common / area(a).min(area(b)).max(1.0)
 }
 
 #[cfg(test)]

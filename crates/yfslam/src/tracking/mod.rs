@@ -120,11 +120,10 @@ impl Tracker {
         if self.correct_shutter(context, self.current_velocity(context), Some(depth)) {
             self.current.features.build_grid();
         }
-        let TrackedFrame { timestamp_ns, t_cam_world, features, .. } = &mut self.current;
-        let first = FirstPose { timestamp_ns: *timestamp_ns, sensor: &context.sensor, map, t_cam_world };
-        if filter.after_pose(&context.config.dynamic, &first, features) {
-            self.current.drop_distrusted();
-            self.current.refine_pose(context);
+        self.filter_again(context, map, filter);
+        if let Some(pose) = filter.corrected_pose() {
+            self.track_from(context, map, pose)?;
+            self.filter_again(context, map, filter);
         }
         self.track_local_map(context, map, min_inliers)?;
         if self.correct_shutter(context, self.current_velocity(context), None) {
@@ -135,6 +134,28 @@ impl Tracker {
         }
         self.correct_last(context, map);
         Ok(())
+    }
+
+    /// Lets the dynamic filter compare the frame with the map, and refines the first pose if something that moves was found.
+    fn filter_again(&mut self, context: &Context, map: &Map, filter: &mut dyn DynamicFilter) {
+        let TrackedFrame { timestamp_ns, t_cam_world, features, .. } = &mut self.current;
+        let first = FirstPose { timestamp_ns: *timestamp_ns, sensor: &context.sensor, map, t_cam_world };
+        if filter.after_pose(&context.config.dynamic, &first, features) {
+            self.current.drop_distrusted();
+            self.current.refine_pose(context);
+        }
+    }
+
+    /// Estimates the first pose anew, near `pose` and from the local map of the last frame: the pose of that frame may have followed an object.
+    ///
+    /// # Errors
+    /// If too few landmarks are inliers.
+    fn track_from(&mut self, context: &Context, map: &Map, pose: Pose) -> Result<(), LostReason> {
+        self.current.clear_matches();
+        self.current.t_cam_world = pose;
+        search_local_map(context, map, &self.local_map.landmarks, &mut self.current, &mut self.visible);
+        let (found, needed) = (self.current.refine_pose(context), context.config.tracking.motion_min_inliers);
+        if found < needed { Err(LostReason::TooFewInliers { found, needed }) } else { Ok(()) }
     }
 
     /// Time from the last frame to the current one, s.

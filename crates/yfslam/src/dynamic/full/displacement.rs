@@ -126,6 +126,12 @@ impl EarlierFrames {
         self.kept_ns = None;
     }
 
+    /// Returns the features of the last frame that is old enough for a step to be seen, and the pose of the camera in it.
+    pub(super) fn recent(&self, config: &FullConfig, first: &FirstPose<'_>) -> Option<(&FrameFeatures, Pose)> {
+        let [recent, _] = choose(&self.frames, config, first);
+        recent.and_then(|frame| Some((&frame.features, frame.seen_from(first)?)))
+    }
+
     /// Looks for the features of the frame in earlier ones; `track_of` returns on the instance of which track, below `tracks`, a position of
     /// the raw image lies.
     pub(super) fn compare(
@@ -139,24 +145,13 @@ impl EarlierFrames {
         if tracks == 0 {
             return;
         }
-        let age_s = |frame: &Earlier| seconds(frame.timestamp_ns, first.timestamp_ns);
-        let is_near = |frame: &&Earlier| {
-            let limit_rad = config.displacement_max_angle_deg.to_radians();
-            frame.seen_from(first).is_some_and(|t_earlier_cam| {
-                t_earlier_cam.translation.vector.norm() <= config.displacement_max_distance_m
-                    && t_earlier_cam.rotation.angle() <= limit_rad
-            })
-        };
-        let oldest = self.frames.iter().find(is_near);
-        let is_old = |frame: &&Earlier| age_s(frame) >= config.displacement_spacing_s;
-        let recent = self.frames.iter().rev().find(is_old).or(oldest);
-        let oldest = oldest.filter(|oldest| recent.is_some_and(|recent| recent.timestamp_ns > oldest.timestamp_ns));
-        for (comparison, frame) in self.comparisons.iter_mut().zip([recent, oldest]) {
+        let frames = choose(&self.frames, config, first);
+        for (comparison, frame) in self.comparisons.iter_mut().zip(frames) {
             comparison.clear(tracks);
             let Some((earlier, t_earlier_cam)) = frame.and_then(|frame| Some((frame, frame.seen_from(first)?))) else {
                 continue;
             };
-            comparison.gap_s = age_s(earlier) as f32;
+            comparison.gap_s = seconds(earlier.timestamp_ns, first.timestamp_ns) as f32;
             let search = Search { config, sensor: first.sensor, earlier: &earlier.features, t_earlier_cam };
             for (i, f) in features.features.iter().enumerate() {
                 let count = match track_of(f.raw) {
@@ -181,22 +176,37 @@ impl Earlier {
     }
 }
 
+/// Chooses the frames to compare with: the last one that is old enough for a step to be seen, and the oldest, if that is another one.
+fn choose<'a>(frames: &'a VecDeque<Earlier>, config: &FullConfig, first: &FirstPose<'_>) -> [Option<&'a Earlier>; 2] {
+    let is_near = |frame: &&Earlier| {
+        let limit_rad = config.displacement_max_angle_deg.to_radians();
+        frame.seen_from(first).is_some_and(|t_earlier_cam| {
+            t_earlier_cam.translation.vector.norm() <= config.displacement_max_distance_m
+                && t_earlier_cam.rotation.angle() <= limit_rad
+        })
+    };
+    let oldest = frames.iter().find(is_near);
+    let is_old = |frame: &&Earlier| seconds(frame.timestamp_ns, first.timestamp_ns) >= config.displacement_spacing_s;
+    let recent = frames.iter().rev().find(is_old).or(oldest);
+    [recent, oldest.filter(|oldest| recent.is_some_and(|recent| recent.timestamp_ns > oldest.timestamp_ns))]
+}
+
 fn seconds(from_ns: i64, to_ns: i64) -> f64 {
     to_ns.saturating_sub(from_ns) as f64 * 1e-9
 }
 
 /// The search of features of the current frame in an earlier one.
-struct Search<'a> {
-    config: &'a FullConfig,
-    sensor: &'a SensorModel,
-    earlier: &'a FrameFeatures,
-    t_earlier_cam: Pose,
+pub(super) struct Search<'a> {
+    pub config: &'a FullConfig,
+    pub sensor: &'a SensorModel,
+    pub earlier: &'a FrameFeatures,
+    pub t_earlier_cam: Pose,
 }
 
 impl Search<'_> {
     /// Returns whether the earlier frame shows a feature at the place that it has now; `None` if it does not show that place, or if the place
     /// is not known.
-    fn find(&self, feature: &Feature, descriptor: &Descriptor) -> Option<bool> {
+    pub(super) fn find(&self, feature: &Feature, descriptor: &Descriptor) -> Option<bool> {
         dispatch!(Level::new(), simd => self.find_with(simd, feature, descriptor))
     }
 

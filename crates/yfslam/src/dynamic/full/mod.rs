@@ -7,21 +7,29 @@
 
 mod depth_history;
 mod displacement;
+mod second_motion;
 
 use crate::config::{DynamicConfig, FullConfig};
 use crate::dynamic::full::depth_history::DepthHistory;
-use crate::dynamic::full::displacement::EarlierFrames;
+use crate::dynamic::full::displacement::{EarlierFrames, Search};
+use crate::dynamic::full::second_motion::{SecondMotion, extent};
 use crate::dynamic::segment::depth_clusters::DepthClusters;
 use crate::dynamic::segment::mask::InstanceMask;
 use crate::dynamic::segment::segmenter::Segmenter;
 use crate::dynamic::tracks::Tracks;
 use crate::dynamic::{DynamicFilter, FilterInput, FirstPose, MovingMask, Region};
 use crate::features::FrameFeatures;
+use crate::geometry::Pose;
 use crate::image::DepthImage;
 use crate::map::KeyframeRelativePose;
 
+/// Successive frames in which the first pose must seem to follow an object. Source: chosen: by chance it does in one frame.
+const MIN_DOUBTS: u32 = 2;
+/// Share of the features of the world that may lie on the surface of the object. Source: chosen: edges are inexact.
+const MAX_SHARE_INSIDE: f32 = 0.15;
+
 /// The filter of method `full`. Buffers are reused.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Full {
     tracks: Tracks,
     clusters: DepthClusters,
@@ -34,6 +42,13 @@ pub(super) struct Full {
     regions: Vec<Region>,
     history: DepthHistory,
     earlier: EarlierFrames,
+    second_motion: SecondMotion,
+    /// The pose of the frame, if its first pose has followed an object.
+    corrected_pose: Option<Pose>,
+    /// Number of successive frames in which the first pose seemed to follow an object.
+    doubts_of_pose: u32,
+    /// Depths of the features of a moving object, m, and their positions, px.
+    sorted: Vec<f32>,
     /// Depth of the cells that the depth history compares, m.
     coarse_m: Vec<f32>,
     /// The same, but 0 where something moves.
@@ -47,7 +62,24 @@ pub(super) struct Full {
 impl Full {
     /// Returns a filter whose random draws start from `seed`.
     pub(super) fn new(seed: u64) -> Self {
-        Self { clusters: DepthClusters::new(seed), ..Self::default() }
+        Self {
+            clusters: DepthClusters::new(seed),
+            second_motion: SecondMotion::new(seed),
+            corrected_pose: None,
+            doubts_of_pose: 0,
+            tracks: Tracks::default(),
+            segmenter: Segmenter::default(),
+            unmapped: InstanceMask::default(),
+            tracked: InstanceMask::default(),
+            regions: Vec::new(),
+            history: DepthHistory::default(),
+            earlier: EarlierFrames::default(),
+            sorted: Vec::new(),
+            coarse_m: Vec::new(),
+            static_m: Vec::new(),
+            counters: Vec::new(),
+            compared: false,
+        }
     }
 
     /// Returns the number of frames for which a track is kept without a detection: fewer where no comparison with the depth history
@@ -116,6 +148,68 @@ impl Full {
             if let (Some(_), Some(share)) = (shares[0], least) {
                 track.add_evidence(config, share, recent.gap_s);
             }
+            track.ended |= track.is_unknown && track.stands_still();
+        }
+    }
+
+    /// Searches an object that moves and that no detector has found, and segments it. If the first pose follows it, the trust of all features
+    /// and the corrected pose are set.
+    fn find_unknown_object(&mut self, config: &DynamicConfig, first: &FirstPose<'_>, features: &mut FrameFeatures) {
+        let doubts = std::mem::take(&mut self.doubts_of_pose);
+        let Some((earlier, t_earlier_cam)) = self.earlier.recent(&config.full, first) else { return };
+        let search = Search { config: &config.full, sensor: first.sensor, earlier, t_earlier_cam };
+        let (unmapped, tracked, tracks) = (&self.unmapped, &self.tracked, &self.tracks.list);
+        let is_candidate = |i: usize| {
+            let track = unmapped.instance_at(features.features[i].raw).and_then(|t| tracks.get(t));
+            track.is_none_or(|track| track.is_unknown)
+        };
+        let is_on_object = |i: u32| tracked.instance_at(features.features[i as usize].raw).is_some();
+        let Some(found) = self.second_motion.search(&config.full, &search, features, is_candidate, is_on_object) else {
+            return;
+        };
+        let (object, _) = self.second_motion.groups(found);
+        let Some((bbox, depth_m)) = extent(features, object, &mut self.sorted) else { return };
+        let (t, before) = self.tracks.move_unknown(bbox, depth_m);
+        self.segment_unknown(config, t);
+        let (object, world) = self.second_motion.groups(found);
+        // What moves together must fill its surface, and the world must lie beside it: single features that move alike by chance lie among those
+        // of the other group.
+        let inside = |group: &[u32]| {
+            let on_it = |i: &&u32| self.tracked.instance_at(features.features[**i as usize].raw) == Some(t);
+            group.iter().filter(on_it).count()
+        };
+        let is_filled = inside(object) >= config.full.second_motion_min_features.max(2 * inside(world) + 1);
+        let is_beside = (inside(world) as f32) < MAX_SHARE_INSIDE * world.len() as f32;
+        let is_object = if found.pose_follows_object {
+            self.doubts_of_pose = if is_filled && is_beside { doubts + 1 } else { 0 };
+            self.doubts_of_pose >= MIN_DOUBTS
+        } else {
+            is_filled
+        };
+        if !is_object {
+            self.tracks.restore_unknown(t, before);
+            self.segment_unknown(config, t);
+        } else if found.pose_follows_object {
+            if found.is_open && before.is_none() {
+                let timestamp_ns = first.timestamp_ns;
+                tracing::warn!(
+                    timestamp_ns,
+                    "most of the image moves together; the part that lies farther away is taken for the world"
+                );
+            }
+            self.corrected_pose = Some(self.second_motion.motion.inverse() * t_earlier_cam * first.t_cam_world);
+            self.segmenter.set_trust(config.full.edge_px, first.sensor, features);
+        }
+    }
+
+    /// Segments the instance of an object that no detector has found anew; nothing if its track has ended.
+    fn segment_unknown(&mut self, config: &DynamicConfig, t: usize) {
+        let track = &mut self.tracks.list[t];
+        for mask in [&mut self.segmenter.instances, &mut self.unmapped, &mut self.tracked] {
+            mask.clear_track(t);
+            if let Some(depth_m) = track.depth_m.filter(|_| track.is_active()) {
+                mask.segment(config, t, &track.bbox, depth_m);
+            }
         }
     }
 
@@ -133,6 +227,10 @@ impl Full {
         self.counters.resize(self.tracks.list.len(), [0; 2]);
         for cell in 0..self.coarse_m.len() {
             let Some(track) = self.tracked.track_of_coarse_cell(cell) else { continue };
+            // The depth of a surface that slides along itself does not change; its features have shown that it moves.
+            if self.tracks.list.get(track).is_some_and(|track| track.is_unknown) {
+                continue;
+            }
             let Some(is_static) = self.history.is_static(cell) else { continue };
             if let Some(counter) = self.counters.get_mut(track) {
                 counter[usize::from(!is_static)] += 1;
@@ -182,7 +280,7 @@ impl DynamicFilter for Full {
         self.unmapped.copy_from(&self.segmenter.instances);
         self.tracked.copy_from(&self.segmenter.instances);
         self.regions.clear();
-        let active = self.tracks.list.iter().filter(|track| track.is_active());
+        let active = self.tracks.list.iter().filter(|track| track.is_active() && !track.is_unknown);
         self.regions.extend(active.map(|track| track.region(config)));
         self.set_trust(config, input, features);
     }
@@ -191,6 +289,11 @@ impl DynamicFilter for Full {
     /// excluded.
     fn after_pose(&mut self, config: &DynamicConfig, first: &FirstPose<'_>, features: &mut FrameFeatures) -> bool {
         self.compared = true;
+        self.corrected_pose = None;
+        self.find_unknown_object(config, first, features);
+        if self.corrected_pose.is_some() {
+            return true;
+        }
         self.sample_depth();
         self.history.compare(&config.full, first, &self.coarse_m);
         self.clear_static(config);
@@ -218,6 +321,10 @@ impl DynamicFilter for Full {
         self.weigh(config, features);
         self.earlier.keep(&config.full, first.timestamp_ns, features);
         found
+    }
+
+    fn corrected_pose(&self) -> Option<Pose> {
+        self.corrected_pose
     }
 
     fn doubt_boxes(&mut self, config: &DynamicConfig, features: &mut FrameFeatures) -> bool {
@@ -308,8 +415,8 @@ mod tests {
         let descriptors = vec![Descriptor::default(); all.len()];
         let detection = Detection { class: 0, score: 0.6, bbox: BOX };
         let (depth, gray) = (room(true), Image::new(640, 480));
-        let mut full = Full::default();
-        let mut frame = |full: &mut Full, share: f32| {
+        let mut full = Full::new(0);
+        let frame = |full: &mut Full, share: f32| {
             let mut features = FrameFeatures::from_parts(all.clone(), descriptors.clone(), sensor.bounds);
             let movable = &[detection];
             let input =
@@ -321,7 +428,9 @@ mod tests {
             [before, features.features[0].trust]
         };
         assert_eq!(frame(&mut full, 0.5), [0.0; 2], "a box is believed at first");
-        (0..10).for_each(|_| drop(frame(&mut full, 1.0)));
+        for _ in 0..10 {
+            frame(&mut full, 1.0);
+        }
         assert!(frame(&mut full, 1.0).into_iter().all(|trust| trust > 0.8), "it stands still");
         let [before, after] = frame(&mut full, 0.0);
         assert!(before > 0.8 && after == 0.0, "it starts to move");
@@ -338,7 +447,7 @@ mod tests {
         let mut map = Map::default();
         let reference = map.insert_keyframe(0, Isometry3::identity(), FrameFeatures::default());
         let first = FirstPose { timestamp_ns: 0, sensor: &sensor, map: &map, t_cam_world: &Isometry3::identity() };
-        let mut full = Full::default();
+        let mut full = Full::new(0);
         let mut features = FrameFeatures::default();
         let mut process = |time_ns: i64, person: bool, boxes: &[Detection]| {
             let (depth, gray) = (room(person), Image::new(640, 480));
