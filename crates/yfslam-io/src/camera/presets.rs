@@ -40,5 +40,7 @@ pub fn preset(name: &str) -> Option<CameraSource> {
     let [fx, fy, cx, cy] = intrinsics;
     let mut camera = Camera::pinhole(640, 480, fx, fy, cx, cy).with_distortion(distortion);
     camera.readout_ms = readout_ms;
-    Some(CameraSource { camera, depth_factor, origin: format!("preset {name}"), unused_keys: Vec::new() })
+    let mut source = CameraSource::new(camera, depth_factor, format!("preset {name}"));
+    (source.kind, source.missing.baseline) = ("preset", true);
+    Some(source)
 }

@@ -101,10 +101,19 @@ fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
         (None, None) => detect_camera(args.folder())?,
     };
     if let Some(factor) = args.depth_factor {
-        source.depth_factor = factor;
+        if !source.missing.depth_factor && factor != source.depth_factor {
+            tracing::info!(
+                file = source.origin,
+                given = source.depth_factor,
+                used = factor,
+                "--depth-factor replaces the factor of the camera file"
+            );
+        }
+        source.set_depth_factor(factor);
         source.origin += &format!(" with --depth-factor {factor}");
         check_camera(&source)?;
     }
+    source.complete_for(sequence)?;
     Ok(source)
 }
 
