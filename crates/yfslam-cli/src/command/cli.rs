@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{bench, calibrate, completions, config, demo, detect, eval, evo, info, map, run, synth};
+use crate::command::{bench, calibrate, camera, completions, config, demo, detect, eval, evo, info, map, run, synth};
 use crate::input::detector::describe_embedded;
 use crate::ui::verbosity::Verbosity;
 
@@ -43,6 +43,7 @@ pub enum Command {
     Synth(synth::SynthArgs),
     Bench(bench::BenchArgs),
     Calibrate(Box<calibrate::CalibrateArgs>),
+    Camera(camera::CameraArgs),
     Info(info::InfoArgs),
     Config(config::ConfigArgs),
     Completions(completions::CompletionsArgs),

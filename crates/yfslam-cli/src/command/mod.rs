@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod calibrate;
+pub mod camera;
 pub mod cli;
 pub mod completions;
 pub mod config;
@@ -37,6 +38,7 @@ pub fn run(cli: &Cli) -> Result<()> {
         Command::Bench(args) => bench::run(args, terminal),
         Command::Synth(args) => synth::run(args, terminal),
         Command::Calibrate(args) => calibrate::run(args, terminal),
+        Command::Camera(args) => camera::run(args),
         Command::Info(args) => info::run(args),
         Command::Config(args) => config::run(args),
         Command::Completions(args) => completions::run(args, Cli::command()),

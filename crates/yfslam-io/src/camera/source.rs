@@ -4,10 +4,7 @@ use yfslam::Camera;
 use yfslam::config::DepthSource;
 
 use super::check::check_camera;
-use crate::decode::decode_color;
 use crate::error::{Error, Result};
-use crate::sequence::Sequence;
-use crate::text::read_bytes;
 
 /// A checked camera calibration and its origin.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,7 +21,7 @@ pub struct CameraSource {
     pub kind: &'static str,
     /// What the user should know about the calibration.
     pub notes: Vec<String>,
-    /// What the file does not say; [`CameraSource::complete`] fills it in.
+    /// What the file does not say; [`complete_camera`](crate::complete_camera) fills it in.
     pub missing: Missing,
 }
 
@@ -106,35 +103,4 @@ impl CameraSource {
         }
         Ok(())
     }
-
-    /// As [`CameraSource::complete`], with the first readable colour image of a sequence of files.
-    ///
-    /// # Errors
-    /// As for [`CameraSource::complete`].
-    pub fn complete_for(&mut self, sequence: &Sequence) -> Result<()> {
-        self.complete(sequence.depth_source, || first_image_size(sequence))
-    }
-}
-
-/// Images that are tried for their size.
-const SIZE_ATTEMPTS: usize = 30;
-
-fn first_image_size(sequence: &Sequence) -> Result<[usize; 2]> {
-    let (mut bytes, mut image, mut first_error) = (Vec::new(), yfslam::RgbImage::default(), None);
-    for entry in sequence.entries.iter().take(SIZE_ATTEMPTS) {
-        let path = &entry.color_path;
-        let read = read_bytes(path, &mut bytes).map_err(|source| Error::read(path, source));
-        let decoded = read.and_then(|()| {
-            decode_color(&bytes, None, &mut image).map_err(|error| {
-                Error::content(path, error.to_string(), "give the size of the images in the camera file")
-            })
-        });
-        match decoded {
-            Ok(_) => return Ok([image.width(), image.height()]),
-            Err(error) => first_error = first_error.or(Some(error)),
-        }
-    }
-    Err(first_error.unwrap_or_else(|| {
-        Error::content(&sequence.folder, "contains no image", "give the size of the images in the camera file")
-    }))
 }

@@ -11,8 +11,8 @@ use yfslam_io::camera::check_camera;
 use yfslam_io::decode::DecodeError;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
 use yfslam_io::{
-    BoxList, CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, detect_camera,
-    load_camera,
+    BoxList, CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, complete_camera,
+    detect_camera, load_camera,
 };
 
 use super::Source;
@@ -31,6 +31,9 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let camera = camera?;
     if !camera.unused_keys.is_empty() {
         tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "keys of the camera file that are not used");
+    }
+    for note in &camera.notes {
+        tracing::warn!("camera {}: {note}", camera.origin);
     }
     check(&sequence, &camera)?;
     let boxes = match own_boxes {
@@ -100,20 +103,21 @@ fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
         (None, Some(calibration)) => calibration.camera.clone(),
         (None, None) => detect_camera(args.folder())?,
     };
+    if args.camera.is_some()
+        && let Ok(own) = detect_camera(args.folder())
+        && own.camera != source.camera
+    {
+        tracing::warn!("--camera {} is used, not the camera file of the folder, {}", source.origin, own.origin);
+    }
     if let Some(factor) = args.depth_factor {
         if !source.missing.depth_factor && factor != source.depth_factor {
-            tracing::info!(
-                file = source.origin,
-                given = source.depth_factor,
-                used = factor,
-                "--depth-factor replaces the factor of the camera file"
-            );
+            tracing::warn!("--depth-factor {factor} is used, not {} of {}", source.depth_factor, source.origin);
         }
         source.set_depth_factor(factor);
         source.origin += &format!(" with --depth-factor {factor}");
         check_camera(&source)?;
     }
-    source.complete_for(sequence)?;
+    complete_camera(&mut source, sequence)?;
     Ok(source)
 }
 
