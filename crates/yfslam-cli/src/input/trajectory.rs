@@ -18,7 +18,10 @@ pub fn read_poses(path: &Path, terminal: Terminal) -> Result<Vec<StampedPose>> {
 
 /// Returns the poses that were read from `path`; warns of those that were left out.
 pub fn checked_poses(file: TrajectoryFile, path: &Path, terminal: Terminal) -> Vec<StampedPose> {
-    let TrajectoryFile { poses, duplicates_skipped, backward_skipped } = file;
+    let TrajectoryFile { poses, duplicates_skipped, backward_skipped, notes, .. } = file;
+    for note in notes {
+        terminal.warn(&format!("{}: {note}", path.display()));
+    }
     if duplicates_skipped + backward_skipped > 0 {
         terminal.warn(&format!(
             "{}: {duplicates_skipped} poses skipped because their time stamp repeats, {backward_skipped} because it runs backward",
