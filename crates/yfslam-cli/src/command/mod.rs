@@ -6,6 +6,7 @@ pub mod camera;
 pub mod cli;
 pub mod completions;
 pub mod config;
+pub mod convert;
 pub mod demo;
 pub mod detect;
 pub mod eval;
@@ -31,6 +32,7 @@ pub fn run(cli: &Cli) -> Result<()> {
         Command::Run(args) => run::run(args, terminal),
         Command::Map(args) => map::run(args, terminal),
         Command::Eval(args) => eval::run(args, terminal),
+        Command::Convert(args) => convert::run(args, terminal),
         Command::Ape(args) => evo::run_ape(args, terminal),
         Command::Rpe(args) => evo::run_rpe(args, terminal),
         Command::Demo(args) => demo::run(args, terminal),

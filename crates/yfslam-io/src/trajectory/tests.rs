@@ -51,7 +51,8 @@ fn repeated_and_backward_stamps_are_skipped_and_counted() {
     let lines: String = ["1", "2", "2", "9", "3", "4"].iter().map(|t| format!("{t} {t} 0 0 0 0 0 1\n")).collect();
     let file = parse(&lines).unwrap();
     assert_eq!((file.poses.len(), file.duplicates_skipped, file.backward_skipped), (4, 1, 1));
-    let unsorted = parse("4 4 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n").unwrap();
+    let unsorted =
+        parse("4 4 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n").unwrap();
     let found: Vec<f64> = unsorted.poses.iter().map(|pose| pose.t_world_cam.translation.x).collect();
     assert_eq!((found, unsorted.duplicates_skipped), (vec![1.0, 2.0, 3.0, 4.0], 1));
     assert!(unsorted.notes[0].contains("sorted"), "{:?}", unsorted.notes);
