@@ -13,6 +13,7 @@ use yfslam_eval::{
 use yfslam_report::{Table, TableStyle, evaluation_table};
 
 use crate::input::trajectory::read_compared;
+use crate::output::plots::write_plots;
 use crate::run::evaluation::{EvaluationArgs, ScaleSource, evaluate_possible, scale_warning};
 use crate::ui::terminal::{Terminal, print};
 
@@ -60,6 +61,9 @@ pub struct EvalArgs {
     /// apart, because it has more free parameters than the usual one.
     #[arg(long, help_heading = "Evaluation")]
     calibrate: bool,
+    /// Write figures of trajectories and errors into this folder, as SVG and PDF.
+    #[arg(long, value_name = "DIR")]
+    plots: Option<PathBuf>,
     /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
@@ -145,6 +149,14 @@ pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
         terminal.warn(&warning);
     }
     let versus = args.versus.as_deref().zip(others.first()).map(|(path, other)| evaluated(path, other)).transpose()?;
+    if let Some(folder) = &args.plots {
+        let first = Some((args.estimate.as_path(), estimate.as_slice(), &evaluation));
+        let second = args.versus.as_deref().zip(others.first()).zip(versus.as_ref());
+        let second = second.map(|((path, other), versus)| (path, other.as_slice(), versus));
+        let estimates: Vec<_> = first.into_iter().chain(second).collect();
+        let written = write_plots(folder, &args.groundtruth, truth, &estimates)?;
+        terminal.note(&format!("{written} figures written to {}, each as SVG and PDF", folder.display()));
+    }
     let improvement_percent = versus.as_ref().map(|versus| improvements(&evaluation, versus));
     let calibration = args.calibrate.then(|| calibrate(truth, estimate, max_diff_ns)).transpose();
     let calibration = calibration.with_context(|| format!("cannot calibrate {}", args.estimate.display()))?;

@@ -149,6 +149,9 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
     let mut source =
         Source::open(&args.source, config.depth.source, boxes.is_source().then_some(&*config.dynamic.movable))?;
+    for note in &source.camera.notes {
+        terminal.warn(&format!("camera {}: {note}", source.camera.origin));
+    }
     config.depth.source = source.depth_source;
     ensure!(
         !args.dense || config.depth.source == DepthSource::Image,

@@ -32,9 +32,6 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     if !camera.unused_keys.is_empty() {
         tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "keys of the camera file that are not used");
     }
-    for note in &camera.notes {
-        tracing::warn!("camera {}: {note}", camera.origin);
-    }
     check(&sequence, &camera)?;
     let boxes = match own_boxes {
         Some(classes) => Some(BoxList::read(&args.boxes_file())?.detections(classes)),
@@ -103,22 +100,32 @@ fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
         (None, Some(calibration)) => calibration.camera.clone(),
         (None, None) => detect_camera(args.folder())?,
     };
-    if args.camera.is_some()
-        && let Ok(own) = detect_camera(args.folder())
-        && own.camera != source.camera
-    {
-        tracing::warn!("--camera {} is used, not the camera file of the folder, {}", source.origin, own.origin);
-    }
     if let Some(factor) = args.depth_factor {
         if !source.missing.depth_factor && factor != source.depth_factor {
-            tracing::warn!("--depth-factor {factor} is used, not {} of {}", source.depth_factor, source.origin);
+            source.notes.push(format!("--depth-factor {factor} is used, not its own factor {}", source.depth_factor));
         }
         source.set_depth_factor(factor);
         source.origin += &format!(" with --depth-factor {factor}");
         check_camera(&source)?;
     }
     complete_camera(&mut source, sequence)?;
+    if args.camera.is_some()
+        && let Ok(own) = detect_camera(args.folder())
+        && differs(&own, &source)
+    {
+        source.notes.push(format!("it is used, not the camera file of the folder, {}", own.origin));
+    }
     Ok(source)
+}
+
+/// Returns whether two calibrations differ in what both state.
+fn differs(own: &CameraSource, used: &CameraSource) -> bool {
+    let lens = |source: &CameraSource| {
+        let c = &source.camera;
+        ([c.fx, c.fy, c.cx, c.cy], c.distortion, c.rational)
+    };
+    let size = |source: &CameraSource| [source.camera.width, source.camera.height];
+    lens(own) != lens(used) || (!own.missing.size && size(own) != size(used))
 }
 
 /// Returns the name of the folder, also for `.` and similar paths.
