@@ -249,7 +249,8 @@ fn the_rational_model_is_read_from_the_dialects_that_have_it() {
          distortion_coefficients: {{rows: 1, cols: 8, data: [{eight}]}}\n"
     );
     let colmap = format!("7 FULL_OPENCV 640 480 611.5 612.25 319.25 244 {}\n", eight.replace(',', ""));
-    let wanted = camera().with_rational_distortion([0.02, -0.03, 0.004]);
+    let mut wanted = camera();
+    wanted.rational = [0.02, -0.03, 0.004];
     for (name, text) in [("ros.yaml", ros), ("cameras.txt", colmap)] {
         let source = parse(name, &text);
         assert_eq!((source.camera.distortion, source.camera.rational), (wanted.distortion, wanted.rational), "{name}");

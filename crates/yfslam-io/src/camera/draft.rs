@@ -57,9 +57,8 @@ impl Draft {
     pub fn into_source(self, kind: &'static str, settings: Option<Settings>, origin: String) -> CameraSource {
         let [fx, fy, cx, cy] = self.intrinsics;
         let [width, height] = self.size.unwrap_or_default();
-        let mut camera = Camera::pinhole(width, height, fx, fy, cx, cy)
-            .with_distortion(self.lens.polynomial)
-            .with_rational_distortion(self.lens.rational);
+        let mut camera = Camera::pinhole(width, height, fx, fy, cx, cy).with_distortion(self.lens.polynomial);
+        camera.rational = self.lens.rational;
         camera.fps = self.fps.unwrap_or(camera.fps);
         camera.bf = self.bf.unwrap_or(camera.bf);
         let missing = Missing {
