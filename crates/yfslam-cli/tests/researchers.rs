@@ -151,3 +151,59 @@ fn converted_trajectories_are_the_same_and_figures_are_whole_files() {
         assert!(pdf.starts_with(b"%PDF-") && pdf.trim_ascii_end().ends_with(b"%%EOF") && pdf.len() > 2000, "{name}");
     }
 }
+
+/// Writes a curve that turns, and an estimate of it with errors and a scale of 1.02, in the three formats.
+fn turning_curves(folder: &Path) {
+    for (name, e) in [("truth", 0.0), ("estimate", 1.0)] {
+        let (mut tum, mut euroc, mut kitti) =
+            (String::new(), "#timestamp [ns],x,y,z,qw,qx,qy,qz\n".to_owned(), String::new());
+        for i in 0..200u32 {
+            let a = 0.05 * f64::from(i);
+            let scale = 1.0 + 0.02 * e;
+            let x = (2.0 * a.cos() + e * 0.02 * (7.0 * a).sin()) * scale;
+            let y = (1.5 * a.sin() + e * 0.015 * (5.0 * a).cos()) * scale;
+            let z = (0.3 * a + e * 0.01 * (11.0 * a).sin()) * scale;
+            let yaw = a + e * 0.01 * (3.0 * a).sin();
+            let (sin, cos, qz, qw) = (yaw.sin(), yaw.cos(), (yaw / 2.0).sin(), (yaw / 2.0).cos());
+            let stamp_ns = 1_500_000_000_000_000_000 + u64::from(i) * 100_000_000;
+            writeln!(tum, "{}.{:09} {x} {y} {z} 0 0 {qz} {qw}", stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000)
+                .unwrap();
+            writeln!(euroc, "{stamp_ns},{x},{y},{z},{qw},0,0,{qz}").unwrap();
+            writeln!(kitti, "{cos} {} 0 {x} {sin} {cos} 0 {y} 0 0 1 {z}", -sin).unwrap();
+        }
+        for (ending, text) in [("tum", tum), ("csv", euroc), ("kitti", kitti)] {
+            fs::write(folder.join(format!("{name}.{ending}")), text).unwrap();
+        }
+    }
+}
+
+#[test]
+fn errors_equal_those_of_evo_for_every_format_and_alignment() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    turning_curves(folder);
+    let near = |value: &Value, expected: f64, what: &str| {
+        assert!((value.as_f64().unwrap() - expected).abs() < 1e-9, "{what}: {value}, not {expected}");
+    };
+    let eval = |args: &[&str]| -> Value {
+        let common = ["--delta", "10f", "--json"];
+        serde_json::from_str(&succeeds(folder, &[&["eval"], args, &common].concat()).stdout).unwrap()
+    };
+    // evo 1.38.1 on these files: evo_ape tum|euroc|kitti with -a, -as, --align_origin and without; evo_rpe -d 10 -u f.
+    for files in [["truth.tum", "estimate.tum"], ["truth.csv", "estimate.tum"], ["truth.kitti", "estimate.kitti"]] {
+        let json = eval(&files);
+        let what = files.join(" ");
+        near(&json["estimate"]["ate"]["translation_m"]["rmse"], 0.044094211651, &what);
+        near(&json["estimate"]["ate"]["translation_m"]["mean"], 0.041584349085, &what);
+        near(&json["estimate"]["ate"]["translation_m"]["max"], 0.066480209533, &what);
+        near(&json["estimate"]["beside"]["translation_m"]["rmse"], 0.018955232464, &what);
+        near(&json["estimate"]["rpe"][0]["translation_m"]["rmse"], 0.039609383199, &what);
+        near(&json["estimate"]["rpe"][0]["translation_m"]["max"], 0.057617623846, &what);
+        near(&json["estimate"]["rpe"][0]["rotation_deg"]["rmse"], 0.555490096974, &what);
+        let origin = eval(&[&files[..], &["--align", "origin"]].concat());
+        near(&origin["estimate"]["ate"]["translation_m"]["rmse"], 0.068561327733, &what);
+        near(&origin["estimate"]["ate"]["translation_m"]["max"], 0.116103861613, &what);
+        let none = eval(&[&files[..], &["--align", "none"]].concat());
+        near(&none["estimate"]["ate"]["translation_m"]["rmse"], 0.053667204954, &what);
+    }
+}

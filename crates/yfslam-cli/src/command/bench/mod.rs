@@ -3,6 +3,7 @@
 mod benchmark_datasets;
 mod cell;
 mod external;
+mod figures;
 mod names;
 mod paper;
 mod runner;
@@ -19,6 +20,7 @@ use yfslam_report::{TableSection, TableStyle, TablesPage};
 
 use self::cell::{Cell, Group};
 use self::external::External;
+use self::figures::SequenceFigures;
 use self::names::distinct_names;
 use self::paper::sections;
 use self::runner::Bench;
@@ -41,11 +43,12 @@ Examples:
   yfslam bench --known DIR --methods none,yf,full        the dynamic sequences of TUM and Bonn in a folder
 
 Files in the output folder:
-  report.html  tables of the paper: errors with their improvement on none, times, frames tracked
+  report.html  tables of the paper: errors with their improvement on none, times, frames tracked; figures
   table.md     the same tables as Markdown
   tables/      each table as CSV and as LaTeX (booktabs, the best figures bold)
   cells.csv    one line for each run, one number in each cell
   summary.csv  one line for each sequence and system: medians and ranges over the seeds
+  figures/     trajectories and errors of all systems with the first seed, as SVG and PDF
   cells/       results of each run as JSON; existing ones are reused unless program or options have changed
   runs/        output folders of the runs
 
@@ -134,7 +137,9 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
     }
     let sections = sections(&cells);
     let mut failures = Failures::new(terminal);
-    let page = write(out.path(), args, &cells, &sections, missing, &mut failures);
+    let drawn = figures::draw(out.path(), &groups, &args.external, &args.extra, terminal);
+    let drawn = failures.keep(drawn).unwrap_or_default();
+    let page = write(out.path(), args, &cells, &sections, &drawn, missing, &mut failures);
     let overview = sections.first().map_or(String::new(), |section| section.table.render(TableStyle::Markdown));
     let summary = format!("{overview}\nwritten to {}\nreport: {}\n", out.path().display(), page.display());
     let printed = terminal.result(&summary);
@@ -148,6 +153,7 @@ fn write(
     args: &BenchArgs,
     cells: &[Cell],
     sections: &[TableSection],
+    drawn: &[SequenceFigures],
     missing: &str,
     failures: &mut Failures,
 ) -> PathBuf {
@@ -175,7 +181,19 @@ fn write(
     facts.extend(missing.lines().map(|line| ("Not run", line.to_owned())));
     let version = env!("CARGO_PKG_VERSION");
     let title = "Comparison of methods";
-    let page = TablesPage { title, facts, sections, version, command: command_line() }.html();
+    // The page has trajectory and error over time; the other figures are in the folder.
+    let shown = [
+        "trajectory-from-above",
+        "trajectory-from-the-side",
+        "translation-error",
+        "rmse-and-standard-deviation-of-the-ate",
+    ];
+    let of_sequence = |one: &SequenceFigures| {
+        let chosen = one.figures.iter().filter(|figure| shown.contains(&figure.name.as_str()));
+        chosen.map(|figure| (format!("{}: {}", one.sequence, figure.title), figure.svg.clone())).collect::<Vec<_>>()
+    };
+    let figures = drawn.iter().flat_map(of_sequence).collect();
+    let page = TablesPage { title, facts, sections, figures, version, command: command_line() }.html();
     let path = out.join("report.html");
     for (path, text) in [
         (&out.join("table.md"), &text),
