@@ -14,7 +14,7 @@ use serde_json::Value;
 fn settings(folder: &Path) -> String {
     let toml: toml::Table = fs::read_to_string(folder.join("camera.toml")).unwrap().parse().unwrap();
     let mut text = "%YAML:1.0\n".to_owned();
-    for key in ["fx", "fy", "cx", "cy"] {
+    for key in ["fx", "fy", "cx", "cy", "bf", "fps"] {
         writeln!(text, "Camera.{key}: {}", toml[key].as_float().unwrap()).unwrap();
     }
     text
@@ -37,7 +37,8 @@ fn a_file_without_size_and_depth_factor_gives_the_trajectory_of_the_complete_one
     let plain = succeeds(folder, &["run", "seq", "--method", "none", "--out", "plain"]).stderr;
     assert!(!plain.contains("is used, not"), "{plain}");
     let mut toml = fs::read_to_string(folder.join("seq/camera.toml")).unwrap();
-    toml = toml.replace("depth_factor = 5000.0", "depth_factor = 4000.0").replace("cx = ", "cx = 1");
+    toml = toml.replace("depth_factor = 5000.0", "depth_factor = 4000.0").replace("cy = 1", "cy = 2");
+    assert!(toml.contains("4000") && toml.contains("cy = 2"), "{toml}");
     fs::write(folder.join("other.toml"), toml).unwrap();
     let output = succeeds(
         folder,
@@ -46,7 +47,36 @@ fn a_file_without_size_and_depth_factor_gives_the_trajectory_of_the_complete_one
     for words in ["--depth-factor 5000 is used, not its own factor 4000", "not the camera file of the folder"] {
         assert!(output.stderr.contains(words), "{}", output.stderr);
     }
-    assert_eq!(report(&folder.join("x"))["frames"]["total"], 12);
+    assert_eq!(report(&folder.join("x"))["frames"]["tracked"], 12);
+}
+
+#[test]
+fn stereo_needs_a_baseline_and_stereo_and_mono_need_no_depth_factor() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    let world = "walking_xyz?people=0&width=320&height=240&frames=12&stereo=0.11";
+    succeeds(folder, &["synth", world, "--out", "seq"]);
+    let settings = settings(&folder.join("seq"));
+    let without = settings.lines().filter(|line| !line.starts_with("Camera.bf")).collect::<Vec<_>>().join("\n") + "\n";
+    let second = without.replace("%YAML:1.0\n", "").replace("Camera.", "Camera2.");
+    let pair = |turn: &str| {
+        let motion = format!("1.0, {turn}, 0.0, 0.11, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0");
+        format!("{without}{second}Stereo.T_c1_c2: !!opencv-matrix\n  rows: 4\n  cols: 4\n  dt: f\n  data: [{motion}]\n")
+    };
+    for (name, text) in [("bf", &settings), ("nobf", &without), ("pair", &pair("0.0")), ("turned", &pair("0.1"))] {
+        fs::write(folder.join(format!("{name}.yaml")), text).unwrap();
+    }
+    let run = |camera: &str, out: &str| {
+        succeeds(folder, &["run", "seq", "--method", "none", "--camera", camera, "--out", out]);
+        fs::read_to_string(folder.join(out).join("trajectory.txt")).unwrap()
+    };
+    assert_eq!(run("bf.yaml", "bf"), run("pair.yaml", "pair"));
+    let args = |camera| ["run", "seq", "--method", "none", "--camera", camera];
+    fails(folder, &args("nobf.yaml"), &["nobf.yaml", "baseline of the stereo camera is missing", "Stereo.b"]);
+    fails(folder, &args("turned.yaml"), &["turned.yaml", "Camera2.fx", "rectify"]);
+    fails(folder, &args("tum3"), &["preset tum3", "baseline"]);
+    // A single camera needs neither; twelve frames are too few for a map of its own.
+    fails(folder, &[&args("nobf.yaml")[..], &["--sensor", "mono"]].concat(), &["no map could be initialised"]);
 }
 
 #[test]
