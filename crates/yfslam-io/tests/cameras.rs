@@ -311,6 +311,12 @@ fn what_changes_the_image_is_refused_with_key_and_cure() {
             ["c.txt:2", "several cameras", "keep"],
         ),
         ("n.txt", "1 2 3 4 5\n".into(), ["n.txt", "5 numbers", "fx fy cx cy"]),
+        ("d.txt", "0.5 0.7 0.5 0.5 0.9\n640 480\ncrop\n640 480\n".into(), ["d.txt", "begins with numbers", "relative"]),
+        (
+            "t.json",
+            "{\"fl_x\": 600.0, \"camera_model\": \"OPENCV_FISHEYE\"}".into(),
+            ["t.json", "OPENCV_FISHEYE", "undistort"],
+        ),
         ("x.xml", "<?xml version=\"1.0\"?>\n<opencv_storage/>\n".into(), ["x.xml", "XML", "YAML"]),
         ("o.ini", "# oST version 5.0 parameters\n[image]\n\nwidth\n640\n".into(), ["o.ini", "[image]", "YAML"]),
         ("j.json", "{\"width\": 640,\n \"height\" 480}".into(), ["j.json:2", "JSON", "repair"]),

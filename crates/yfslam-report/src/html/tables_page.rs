@@ -60,7 +60,7 @@ impl TablesPage<'_> {
             @if !self.figures.is_empty() {
                 section #figures {
                     h2 { "Figures" }
-                    p.about { "Trajectories and errors with the first seed." }
+                    p.about { "Trajectories and errors with the first seed; errors over all seeds, with quartiles, extremes and a dot for each run." }
                     div.pair { @for (title, svg) in &self.figures { (drawn(title, svg)) } }
                 }
             }

@@ -1,4 +1,5 @@
-//! Figures of a bench: for each sequence the trajectories and errors of all systems with the first seed.
+//! Figures of a bench: for each sequence the trajectories and errors of all systems with the first seed, and the errors over all
+//! seeds.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -7,10 +8,11 @@ use anyhow::Result;
 use yfslam_eval::{Evaluation, StampedPose};
 use yfslam_io::TrajectoryFile;
 use yfslam_io::trajectory::TrajectoryFormat;
-use yfslam_report::FigureFile;
+use yfslam_report::{FigureFile, errors_over_runs};
 
-use super::cell::Group;
+use super::cell::{Cell, Group};
 use super::external::External;
+use super::table::rows;
 use crate::command::run::RunArgs;
 use crate::output::plots::{Plotted, figures, write_figures};
 use crate::run::evaluation::evaluate_possible;
@@ -29,6 +31,7 @@ pub struct SequenceFigures {
 pub fn draw(
     out: &Path,
     groups: &[Group],
+    cells: &[Cell],
     externals: &[External],
     extra: &[String],
     terminal: Terminal,
@@ -38,11 +41,21 @@ pub fn draw(
         if drawn.iter().any(|one| one.sequence == group.sequence) {
             continue;
         }
-        let figures = of_group(out, group, externals, extra, terminal).unwrap_or_default();
+        let mut figures = of_group(out, group, externals, extra, terminal).unwrap_or_default();
+        figures.extend(errors_over_runs(&errors(cells, &group.sequence)));
         write_figures(&out.join("figures"), &format!("{}-", group.key()), &figures)?;
         drawn.push(SequenceFigures { sequence: group.sequence.clone(), figures });
     }
     Ok(drawn)
+}
+
+/// Returns the errors of each system on a sequence, over the seeds.
+fn errors(cells: &[Cell], sequence: &str) -> Vec<(String, Vec<f64>)> {
+    let rows = rows(cells);
+    let of_sequence = rows.iter().filter(|row| row.sequence == sequence);
+    of_sequence
+        .map(|row| (row.method.to_owned(), row.cells.iter().filter_map(|cell| cell.ate_rmse_m).collect()))
+        .collect()
 }
 
 /// Returns the figures of a group; none if it has no ground truth or no result.

@@ -48,7 +48,7 @@ Files in the output folder:
   tables/      each table as CSV and as LaTeX (booktabs, the best figures bold)
   cells.csv    one line for each run, one number in each cell
   summary.csv  one line for each sequence and system: medians and ranges over the seeds
-  figures/     trajectories and errors of all systems with the first seed, as SVG and PDF
+  figures/     trajectories and errors of all systems with the first seed, and errors over the seeds, as SVG and PDF
   cells/       results of each run as JSON; existing ones are reused unless program or options have changed
   runs/        output folders of the runs
 
@@ -137,7 +137,7 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
     }
     let sections = sections(&cells);
     let mut failures = Failures::new(terminal);
-    let drawn = figures::draw(out.path(), &groups, &args.external, &args.extra, terminal);
+    let drawn = figures::draw(out.path(), &groups, &cells, &args.external, &args.extra, terminal);
     let drawn = failures.keep(drawn).unwrap_or_default();
     let page = write(out.path(), args, &cells, &sections, &drawn, missing, &mut failures);
     let overview = sections.first().map_or(String::new(), |section| section.table.render(TableStyle::Markdown));
@@ -182,12 +182,7 @@ fn write(
     let version = env!("CARGO_PKG_VERSION");
     let title = "Comparison of methods";
     // The page has trajectory and error over time; the other figures are in the folder.
-    let shown = [
-        "trajectory-from-above",
-        "trajectory-from-the-side",
-        "translation-error",
-        "rmse-and-standard-deviation-of-the-ate",
-    ];
+    let shown = ["trajectory-from-above", "trajectory-from-the-side", "translation-error", "ate-over-runs"];
     let of_sequence = |one: &SequenceFigures| {
         let chosen = one.figures.iter().filter(|figure| shown.contains(&figure.name.as_str()));
         chosen.map(|figure| (format!("{}: {}", one.sequence, figure.title), figure.svg.clone())).collect::<Vec<_>>()
