@@ -77,9 +77,12 @@ pub fn overview(rows: &[Row]) -> Table {
     table
 }
 
+/// A figure of a cell, if it is known.
+type Figure = fn(&Cell) -> Option<f64>;
+
 /// Returns one line for each sequence and method, with one number in each cell; unknown figures are empty.
 pub fn summary_csv(cells: &[Cell]) -> String {
-    let figures: [(&str, fn(&Cell) -> Option<f64>); 5] = [
+    let figures: [(&str, Figure); 5] = [
         ("ate_rmse_m", |c| c.ate_rmse_m),
         ("tracked", |c| c.tracked),
         ("rpe_frame_m", |c| c.rpe_frame_m),
