@@ -219,6 +219,8 @@ fn errors_equal_those_of_evo_for_every_format_and_alignment() {
         let common = ["--delta", "10f", "--json"];
         serde_json::from_str(&succeeds(folder, &[&["eval"], args, &common].concat()).stdout).unwrap()
     };
+    let ape = succeeds(folder, &["ape", "kitti", "truth.kitti", "estimate.kitti", "--align_origin"]).stdout;
+    assert!(ape.contains("ATE, first pose (m)  0.0686"), "{ape}");
     // evo 1.38.1 on these files: evo_ape tum|euroc|kitti with -a, -as, --align_origin and without; evo_rpe -d 10 -u f.
     for files in [["truth.tum", "estimate.tum"], ["truth.csv", "estimate.tum"], ["truth.kitti", "estimate.kitti"]] {
         let json = eval(&files);

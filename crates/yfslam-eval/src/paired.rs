@@ -115,9 +115,10 @@ mod tests {
         assert_eq!(of(&[]), 1.0);
         // Ties: two of the same size and opposite signs say nothing.
         assert!((of(&[1.0, -1.0]) - 1.0).abs() < 1e-12);
-        // scipy.stats.wilcoxon(range(1, 101) with every fourth negated, method="approx", correction=True)
+        // scipy.stats.wilcoxon, exact, and with method="approx" and correction=True.
+        assert!((of(&[0.3, -0.1, 0.5, 0.7, -0.2, 0.9, 1.1, 0.4]) - 0.0390625).abs() < 1e-12);
         let many: Vec<f64> = (1..=100).map(|k| if k % 4 == 0 { -f64::from(k) } else { f64::from(k) }).collect();
-        assert!((of(&many) - 2.5e-5).abs() < 2e-5, "{}", of(&many));
+        assert!((of(&many) - 2.551_122_287_8e-5).abs() < 1e-10, "{}", of(&many));
     }
 
     #[test]
