@@ -114,7 +114,9 @@ pub fn scale_warning(evaluation: &Evaluation, source: ScaleSource) -> Option<Str
             let wanted = factor / scale;
             // A scale that was estimated over a short path is uncertain by some tenths.
             let is_near = |common: &f64| (common / wanted - 1.0).abs() < 0.25 && (common / factor - 1.0).abs() > 0.05;
-            let common: Vec<String> = FACTORS.into_iter().filter(is_near).map(|common| common.to_string()).collect();
+            let mut common: Vec<f64> = FACTORS.into_iter().filter(is_near).collect();
+            common.sort_by(|a, b| (a / wanted - 1.0).abs().total_cmp(&(b / wanted - 1.0).abs()));
+            let common: Vec<String> = common.iter().map(f64::to_string).collect();
             match &common[..] {
                 [] => format!("check the depth factor {factor} (about {wanted:.0} would fit) and the focal length"),
                 _ => format!(
