@@ -12,10 +12,12 @@
 
 mod align;
 mod associate;
+mod calibrate;
 mod coverage;
 mod delta;
 mod error;
 mod evaluate;
+mod paired;
 mod pose;
 mod published;
 mod rpe;
@@ -23,10 +25,12 @@ mod statistics;
 
 pub use align::{Alignment, AlignmentKind, Ate, align, ate, horn_matrix};
 pub use associate::{DEFAULT_MAX_DIFF_NS, Match, associate};
+pub use calibrate::{Calibration, calibrate};
 pub use coverage::Coverage;
 pub use delta::Delta;
 pub use error::{EvalError, Trajectory};
 pub use evaluate::{EvalOptions, Evaluation, ExpectedFrames, evaluate};
+pub use paired::{Paired, paired};
 pub use pose::StampedPose;
 pub use published::{Measure, Published, published};
 pub use rpe::{Rpe, RpeOptions, rpe};

@@ -11,6 +11,7 @@ use anyhow::{Context, Result, ensure};
 use clap::{Args, Command, FromArgMatches};
 use yfslam::config::DepthSource;
 use yfslam::{Config, Method};
+use yfslam_eval::{EvalOptions, ExpectedFrames};
 use yfslam_report::{TableStyle, evaluation_table};
 
 use self::checkpoint::Checkpoints;
@@ -25,7 +26,7 @@ use crate::output::recorder::RunOutputs;
 use crate::output::report::{ReportedRun, RunReport};
 use crate::output::summary;
 use crate::run::cost::frame_costs;
-use crate::run::evaluation::EvaluationArgs;
+use crate::run::evaluation::{EvaluationArgs, ScaleSource, scale_warning};
 use crate::run::map_args::MapArgs;
 use crate::run::method_run::{EvalContext, RunResult};
 use crate::run::shared_detector::{DetectionTally, SharedDetector};
@@ -149,6 +150,9 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
     let mut source =
         Source::open(&args.source, config.depth.source, boxes.is_source().then_some(&*config.dynamic.movable))?;
+    for note in &source.camera.notes {
+        terminal.warn(&format!("camera {}: {note}", source.camera.origin));
+    }
     config.depth.source = source.depth_source;
     ensure!(
         !args.dense || config.depth.source == DepthSource::Image,
@@ -221,6 +225,7 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let printed = terminal.result(&text);
     failures.check()?;
     interrupt.check()?;
+    warn_of_scale(&only_results, source, terminal);
     check_accuracy(args, &only_results, terminal)?;
     printed
 }
@@ -233,6 +238,23 @@ impl RunArgs {
     pub fn parse(arguments: &[OsString]) -> Result<Self> {
         let command = Self::augment_args(Command::new("yfslam run").no_binary_name(true));
         Ok(Self::from_arg_matches(&command.try_get_matches_from(arguments)?)?)
+    }
+
+    /// Returns what an estimate of another program is evaluated with: the time stamps of all frames, the ground truth, and the options.
+    ///
+    /// # Errors
+    /// The sequence cannot be opened, or has no ground truth.
+    pub fn reference(&self, terminal: Terminal) -> Result<(Vec<i64>, Truth, EvalOptions)> {
+        let source = Source::open(&self.source, self.settings.resolve()?.depth.source, None)?;
+        let truth = source.truth(self.groundtruth.as_deref(), terminal)?;
+        let truth = truth.with_context(|| format!("{} has no ground truth", source.name))?;
+        let options = EvalOptions {
+            max_diff_ns: self.evaluation.max_diff_ns()?,
+            alignment: self.evaluation.alignment(source.depth_source != DepthSource::Motion),
+            expected: ExpectedFrames::StampsNs(source.stamps_ns.clone()),
+            ..EvalOptions::default()
+        };
+        Ok((source.stamps_ns, truth, options))
     }
 
     /// Checks before a run that its map can be saved after it, in a file of its own.
@@ -294,6 +316,20 @@ fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Opt
             Ok(None)
         }
         truth => truth.context("the ground truth cannot be used"),
+    }
+}
+
+/// Warns if lengths differ from those of the ground truth; the scale of a single camera is arbitrary.
+fn warn_of_scale(results: &[&RunResult], source: &Source, terminal: Terminal) {
+    let camera = &source.camera;
+    let scale = match source.depth_source {
+        DepthSource::Image => ScaleSource::DepthFactor(camera.depth_factor),
+        DepthSource::Stereo => ScaleSource::Baseline(camera.camera.bf / camera.camera.fx),
+        DepthSource::Motion => return,
+    };
+    let warning = results.iter().find_map(|result| scale_warning(result.evaluation()?, scale));
+    if let Some(warning) = warning {
+        terminal.warn(&warning);
     }
 }
 

@@ -21,7 +21,7 @@ pub struct SourceArgs {
     /// Folder in TUM RGB-D, Bonn, EuRoC or KITTI odometry layout, or a synthetic world such as `synth:walking_xyz?seed=7`.
     #[arg(value_name = "SEQUENCE", help_heading = None)]
     pub sequence: String,
-    /// Camera: tum1, tum2, tum3, bonn, or a settings file in TOML or ORB-SLAM's YAML [default: the camera file in the folder].
+    /// Camera: a preset such as tum1, bonn or d435i, or a camera file of any common kind [default: the camera file in the folder].
     #[arg(long, value_name = "PRESET|FILE")]
     pub camera: Option<String>,
     /// Type of the camera [default: what the sequence has].

@@ -11,8 +11,8 @@ use yfslam_io::camera::check_camera;
 use yfslam_io::decode::DecodeError;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
 use yfslam_io::{
-    BoxList, CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, detect_camera,
-    load_camera,
+    BoxList, CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, complete_camera,
+    detect_camera, load_camera,
 };
 
 use super::Source;
@@ -101,11 +101,31 @@ fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
         (None, None) => detect_camera(args.folder())?,
     };
     if let Some(factor) = args.depth_factor {
-        source.depth_factor = factor;
+        if !source.missing.depth_factor && factor != source.depth_factor {
+            source.notes.push(format!("--depth-factor {factor} is used, not its own factor {}", source.depth_factor));
+        }
+        source.set_depth_factor(factor);
         source.origin += &format!(" with --depth-factor {factor}");
         check_camera(&source)?;
     }
+    complete_camera(&mut source, sequence)?;
+    if args.camera.is_some()
+        && let Ok(own) = detect_camera(args.folder())
+        && differs(&own, &source)
+    {
+        source.notes.push(format!("it is used, not the camera file of the folder, {}", own.origin));
+    }
     Ok(source)
+}
+
+/// Returns whether two calibrations differ in what both state.
+fn differs(own: &CameraSource, used: &CameraSource) -> bool {
+    let lens = |source: &CameraSource| {
+        let c = &source.camera;
+        ([c.fx, c.fy, c.cx, c.cy], c.distortion, c.rational)
+    };
+    let size = |source: &CameraSource| [source.camera.width, source.camera.height];
+    lens(own) != lens(used) || (!own.missing.size && size(own) != size(used))
 }
 
 /// Returns the name of the folder, also for `.` and similar paths.
