@@ -42,6 +42,10 @@ fn recorded(args: &SourceArgs) -> Result<String> {
     let mut text = String::new();
     writeln!(text, "{}", sequence.folder.display())?;
     writeln!(text, "kind          {}, {}", sequence.layout.name(), sensor(sequence.depth_source))?;
+    writeln!(text, "              recognised: {}", sequence.because)?;
+    for note in &sequence.notes {
+        writeln!(text, "              {note}")?;
+    }
     lists(&mut text, &sequence)?;
     timing(&mut text, &sequence)?;
     images(&mut text, &sequence, camera.as_ref().ok())?;
@@ -83,6 +87,9 @@ fn lists(text: &mut String, sequence: &Sequence) -> Result<()> {
                 text,
                 "lists         rgb.txt {color_listed}, depth.txt {paired_images_listed} images; {paired} pairs"
             )?;
+        }
+        (_, DepthSource::Image) => {
+            writeln!(text, "images        {color_listed} colour, {paired_images_listed} depth images; {paired} pairs")?;
         }
         _ => writeln!(text, "lists         {color_listed} left, {paired_images_listed} right images; {paired} pairs")?,
     }

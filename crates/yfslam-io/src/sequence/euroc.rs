@@ -58,12 +58,12 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
         (calibration(left.camera, &yaml, None), left.t_body_cam)
     };
     let ground_truth = GroundTruthReader::euroc(root.join("state_groundtruth_estimate0/data.csv"), t_body_cam);
-    Ok(Listing { depth_source, entries, report, calibration: Some(calibration), ground_truth })
+    Ok(Listing { depth_source, entries, report, calibration: Some(calibration), ground_truth, notes: Vec::new() })
 }
 
 fn calibration(camera: Camera, yaml: &Path, rectification: Option<Arc<StereoRectification>>) -> Calibration {
     let origin = format!("{}{}", yaml.display(), if rectification.is_some() { ", rectified with cam1" } else { "" });
-    Calibration { camera: CameraSource::without_depth(camera, origin), rectification }
+    Calibration { camera: CameraSource::without_depth(camera, origin), rectification, depth_resampling: None }
 }
 
 /// Lists the images of a camera.

@@ -85,6 +85,8 @@ mod tests {
             entries: stamps.iter().map(entry).collect(),
             report: AssociationReport::default(),
             mirror: None,
+            because: String::new(),
+            notes: Vec::new(),
         }
     }
 

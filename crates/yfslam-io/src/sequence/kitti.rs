@@ -58,9 +58,9 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
         camera(folder, &entries.first().map(|entry| folder.join(&entry.color_path)), &p_left, &p_right, &stamps_ns)?;
     let camera = CameraSource::without_depth(camera, calib.display().to_string());
     check_camera(&camera)?;
-    let calibration = Some(Calibration { camera, rectification: None });
+    let calibration = Some(Calibration { camera, rectification: None, depth_resampling: None });
     let ground_truth = GroundTruthReader::kitti(ground_truth_path(folder), t_cam0_cam(&p_left), stamps_ns);
-    Ok(Listing { depth_source, entries, report, calibration, ground_truth })
+    Ok(Listing { depth_source, entries, report, calibration, ground_truth, notes: Vec::new() })
 }
 
 /// Reads the times of all frames, ns.

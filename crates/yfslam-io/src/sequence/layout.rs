@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use yfslam::config::DepthSource;
 
-use super::{AssociationReport, FrameEntry, GroundTruthReader, SequenceOptions, euroc, kitti, tum};
+use super::{AssociationReport, FrameEntry, GroundTruthReader, SequenceOptions, detect, euroc, folders, kitti, tum};
 use crate::camera::CameraSource;
+use crate::depth_resampling::DepthResampling;
 use crate::error::{Error, Result};
 use crate::rectify::StereoRectification;
 
@@ -21,6 +22,8 @@ pub enum Layout {
     Euroc,
     /// The KITTI odometry benchmark (Geiger et al., CVPR 2012): `times.txt`, `calib.txt`, `image_2/` or `image_0/`.
     Kitti,
+    /// Folders of colour and depth images without lists, as Open3D and RealSense recorders write them, or one folder of images.
+    Folders,
 }
 
 /// The calibration that a layout brings along.
@@ -30,6 +33,8 @@ pub struct Calibration {
     pub camera: CameraSource,
     /// Rectification of the images, unless they are rectified already.
     pub rectification: Option<Arc<StereoRectification>>,
+    /// Resampling of the depth images to the colour images, unless both have the same size.
+    pub depth_resampling: Option<Arc<DepthResampling>>,
 }
 
 /// Content of a sequence folder.
@@ -39,17 +44,26 @@ pub struct Listing {
     pub report: AssociationReport,
     pub calibration: Option<Calibration>,
     pub ground_truth: GroundTruthReader,
+    /// What was assumed, one sentence each.
+    pub notes: Vec<String>,
 }
 
 impl Layout {
+    /// All layouts.
+    pub const ALL: [Self; 4] = [Self::Tum, Self::Euroc, Self::Kitti, Self::Folders];
+
     /// Detects the layout of `folder`; the default is that of TUM.
     pub fn of(folder: &Path) -> Self {
-        if euroc::root(folder).is_some() {
-            Self::Euroc
-        } else if kitti::is_sequence(folder) {
-            Self::Kitti
-        } else {
-            Self::Tum
+        detect::layout(folder, &SequenceOptions::default()).0
+    }
+
+    /// Returns the short name of the layout, for the command line.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Tum => "tum",
+            Self::Euroc => "euroc",
+            Self::Kitti => "kitti",
+            Self::Folders => "folders",
         }
     }
 
@@ -59,6 +73,7 @@ impl Layout {
             Self::Tum => "TUM RGB-D",
             Self::Euroc => "EuRoC (ASL)",
             Self::Kitti => "KITTI odometry",
+            Self::Folders => "folders of images",
         }
     }
 
@@ -68,6 +83,7 @@ impl Layout {
             Self::Tum => tum::list(folder, options),
             Self::Euroc => euroc::list(folder, options),
             Self::Kitti => kitti::list(folder, options),
+            Self::Folders => folders::list(folder, options),
         }
     }
 }

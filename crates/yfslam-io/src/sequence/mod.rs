@@ -4,9 +4,13 @@
 //! In: the folder and [`SequenceOptions`]. Out: the frames in order, and a report of what was skipped and why.
 
 mod associate;
+mod detect;
 pub(crate) mod euroc;
+mod folders;
 mod ground_truth;
+mod images;
 mod info;
+mod intrinsics;
 pub(crate) mod kitti;
 mod layout;
 pub mod lists;
@@ -25,7 +29,7 @@ pub use layout::{Calibration, Layout};
 use lists::ListedFile;
 
 /// Options for reading a sequence, and the part of it that is played.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SequenceOptions {
     /// The images that are read; `None` reads those that exist, depth images before right images.
     pub depth_source: Option<DepthSource>,
@@ -38,11 +42,48 @@ pub struct SequenceOptions {
     pub end: Option<usize>,
     /// Plays the part backward, with mirrored stamps; see [`TimeMirror`].
     pub reverse: bool,
+    /// The layout; `None` detects it.
+    pub layout: Option<Layout>,
+    /// Frames per second of images without time stamps; `None` takes [`DEFAULT_FPS`].
+    pub fps: Option<f64>,
+    /// List of pairs that is read instead of the lists in the folder.
+    pub associations: Option<PathBuf>,
+    /// Folder of the colour images, where there is no list.
+    pub color_folder: Option<PathBuf>,
+    /// Folder of the depth images, where there is no list.
+    pub depth_folder: Option<PathBuf>,
+    /// Whether the calibration that is part of a layout is read; a caller with a camera of its own leaves it out.
+    pub read_calibration: bool,
 }
+
+/// Rates that a camera can have, frames per second.
+const FPS_RANGE: std::ops::RangeInclusive<f64> = 0.01..=10_000.0;
+
+/// Frames per second of images without time stamps: that of most RGB-D cameras.
+pub const DEFAULT_FPS: f64 = 30.0;
 
 impl Default for SequenceOptions {
     fn default() -> Self {
-        Self { depth_source: None, association_tolerance_ns: 20_000_000, start: 0, end: None, reverse: false }
+        Self {
+            depth_source: None,
+            association_tolerance_ns: 20_000_000,
+            start: 0,
+            end: None,
+            reverse: false,
+            layout: None,
+            fps: None,
+            associations: None,
+            color_folder: None,
+            depth_folder: None,
+            read_calibration: true,
+        }
+    }
+}
+
+impl SequenceOptions {
+    /// Returns the frames per second of images without time stamps.
+    fn fps(&self) -> f64 {
+        self.fps.unwrap_or(DEFAULT_FPS)
     }
 }
 
@@ -101,6 +142,10 @@ pub struct Sequence {
     pub calibration: Option<Calibration>,
     /// Reader of the ground truth.
     pub ground_truth: GroundTruthReader,
+    /// Why the folder was taken for this layout.
+    pub because: String,
+    /// What was assumed or changed when the sequence was read, one sentence each.
+    pub notes: Vec<String>,
 }
 
 impl Sequence {
@@ -113,8 +158,11 @@ impl Sequence {
             let problem = format!("association tolerance {} ns is negative", options.association_tolerance_ns);
             return Err(Error::argument(problem, "give a time of 0 or more, such as 20 ms"));
         }
-        let layout = Layout::of(folder);
-        let layout::Listing { depth_source, mut entries, mut report, calibration, ground_truth } =
+        if let Some(fps) = options.fps.filter(|fps| !FPS_RANGE.contains(fps)) {
+            return Err(Error::argument(format!("{fps} frames per second are out of range"), "give a rate such as 30"));
+        }
+        let (layout, because) = detect::layout(folder, options);
+        let layout::Listing { depth_source, mut entries, mut report, calibration, ground_truth, notes } =
             layout.list(folder, options)?;
         for entry in &mut entries {
             entry.color_path = folder.join(&entry.color_path);
@@ -135,7 +183,7 @@ impl Sequence {
         }
         let (entries, mirror) = cut(folder, entries, options)?;
         let folder = folder.into();
-        Ok(Self { folder, layout, depth_source, entries, report, mirror, calibration, ground_truth })
+        Ok(Self { folder, layout, depth_source, entries, report, mirror, calibration, ground_truth, because, notes })
     }
 }
 

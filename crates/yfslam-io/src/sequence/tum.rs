@@ -42,7 +42,7 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
         DepthSource::Motion => return Err(no_lists(folder, &["rgb.txt"])),
     };
     let ground_truth = GroundTruthReader::tum(folder.join("groundtruth.txt"));
-    Ok(Listing { depth_source: wanted, entries, report, calibration: None, ground_truth })
+    Ok(Listing { depth_source: wanted, entries, report, calibration: None, ground_truth, notes: Vec::new() })
 }
 
 /// Names the lists that are missing and, if a folder inside has them, that folder.

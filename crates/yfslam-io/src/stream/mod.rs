@@ -14,7 +14,8 @@ use yfslam::config::DepthSource;
 use yfslam::{DepthImage, Frame, RgbImage};
 
 use crate::camera::CameraSource;
-use crate::decode::{DecodeError, ImageSize, decode_color, decode_depth};
+use crate::decode::{DecodeError, ImageSize, decode_color, decode_depth_image};
+use crate::depth_resampling::DepthResampling;
 use crate::error::{Error, Result};
 use crate::rectify::{Remap, StereoRectification};
 use crate::sequence::{FrameEntry, Sequence};
@@ -61,8 +62,9 @@ impl FrameStream {
         let camera = &source.camera;
         let entries: Arc<[FrameEntry]> = sequence.entries.as_slice().into();
         let size = ImageSize { width: camera.width, height: camera.height };
-        let metres_per_unit = (1.0 / source.depth_factor) as f32;
-        let rectification = sequence.calibration.as_ref().and_then(|calibration| calibration.rectification.clone());
+        let calibration = sequence.calibration.as_ref();
+        let rectification = calibration.and_then(|calibration| calibration.rectification.clone());
+        let resampling = calibration.and_then(|calibration| calibration.depth_resampling.clone());
         let mut read_left = ColorReader { size, bytes: Vec::new(), rectification };
         let mut read_right = ColorReader { bytes: Vec::new(), ..read_left.clone() };
         let color = PrefetchQueue::start("yfslam-color", entries.clone(), look_ahead, move |entry| {
@@ -71,7 +73,10 @@ impl FrameStream {
         let mut bytes = Vec::new();
         let paired_images = match sequence.depth_source {
             DepthSource::Image => {
-                let read = move |entry: &FrameEntry| read_depth(paired_path(entry), size, metres_per_unit, &mut bytes);
+                let depth_factor = source.depth_factor;
+                let read = move |entry: &FrameEntry| {
+                    read_depth(paired_path(entry), size, depth_factor, resampling.as_deref(), &mut bytes)
+                };
                 PairedImages::Depth(PrefetchQueue::start("yfslam-depth", entries.clone(), look_ahead, read)?)
             }
             DepthSource::Stereo => {
@@ -175,14 +180,20 @@ impl ColorReader {
 fn read_depth(
     path: &Path,
     size: ImageSize,
-    metres_per_unit: f32,
+    depth_factor: f64,
+    resampling: Option<&DepthResampling>,
     bytes: &mut Vec<u8>,
 ) -> std::result::Result<DepthImage, FrameFault> {
-    let mut image = DepthImage { metres_per_unit, ..Default::default() };
+    let mut image = DepthImage::default();
     read(path, bytes)?;
-    decode_depth(bytes, Some(size), &mut image.raw).map_err(|error| image_fault(path, error))?;
+    let size =
+        resampling.map_or(size, |resampling| ImageSize { width: resampling.from[0], height: resampling.from[1] });
+    decode_depth_image(bytes, Some(size), depth_factor, &mut image).map_err(|error| image_fault(path, error))?;
     if image.raw.data().iter().all(|&raw| raw == 0) {
         return Err(FrameFault::NoDepth { path: path.into() });
+    }
+    if let Some(resampling) = resampling {
+        image.raw = resampling.apply(&image.raw);
     }
     Ok(image)
 }

@@ -1,4 +1,4 @@
-//! Recorded sequences: folders in TUM RGB-D, Bonn, EuRoC or KITTI odometry layout.
+//! Recorded sequences: folders in one of the layouts that `yfslam-io` detects.
 
 use std::io::ErrorKind;
 use std::time::Instant;
@@ -16,7 +16,7 @@ use yfslam_io::{
 };
 
 use super::Source;
-use super::args::SourceArgs;
+use super::args::{ASSOCIATION_TOLERANCE_MS, SourceArgs};
 use super::frames::{FolderExtras, Frames, Player};
 use super::masks::Masks;
 use crate::stats::skip::Skip;
@@ -42,8 +42,11 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let stream = FrameStream::open(&sequence, &camera, DEFAULT_LOOK_AHEAD)?;
     let extras = FolderExtras { boxes, mirror: sequence.mirror, masks };
     let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();
+    let mut notes = vec![recognised(&sequence, &camera)];
+    notes.extend(sequence.notes.iter().cloned());
     Ok(Source {
         name: name(args),
+        notes,
         camera,
         depth_source: sequence.depth_source,
         frames: Frames::new(Player::Folder(Box::new((stream, extras))), sequence.depth_source, args, &stamps_ns),
@@ -73,7 +76,7 @@ fn check(sequence: &Sequence, camera: &CameraSource) -> Result<()> {
 /// # Errors
 /// The tolerance is negative or not a number, or the folder has no usable lists.
 pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequence, Result<CameraSource>)> {
-    let tolerance_ms = args.association_tolerance;
+    let tolerance_ms = args.association_tolerance.unwrap_or(ASSOCIATION_TOLERANCE_MS);
     ensure!(
         (0.0..=1e6).contains(&tolerance_ms),
         "--association-tolerance is {tolerance_ms}; give milliseconds, such as 20"
@@ -84,12 +87,15 @@ pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequ
         start: args.start,
         end: args.end,
         reverse: args.reverse,
-    };
-    let mut sequence = Sequence::open(args.folder(), &options)?;
-    if args.camera.is_some() {
+        layout: args.layout,
+        fps: args.fps,
+        associations: args.associations.clone(),
+        color_folder: args.color.clone(),
+        depth_folder: args.depth.clone(),
         // The images are taken as they are: the calibration of the folder does not apply to another camera.
-        sequence.calibration = None;
-    }
+        read_calibration: args.camera.is_none(),
+    };
+    let sequence = Sequence::open(args.folder(), &options)?;
     let camera = camera(args, &sequence);
     Ok((sequence, camera))
 }
@@ -106,6 +112,17 @@ fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
         check_camera(&source)?;
     }
     Ok(source)
+}
+
+/// Describes in one line what the folder was taken for.
+fn recognised(sequence: &Sequence, camera: &CameraSource) -> String {
+    let (folder, layout, frames) = (sequence.folder.display(), sequence.layout.name(), sequence.entries.len());
+    let sensor = match sequence.depth_source {
+        DepthSource::Image => "RGB-D",
+        DepthSource::Stereo => "stereo",
+        DepthSource::Motion => "a single camera",
+    };
+    format!("{folder}: {layout}, {sensor}, {frames} frames; camera: {}", camera.origin)
 }
 
 /// Returns the name of the folder, also for `.` and similar paths.
