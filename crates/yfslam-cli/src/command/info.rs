@@ -7,9 +7,9 @@ use anyhow::Result;
 use clap::Args;
 use yfslam::config::DepthSource;
 use yfslam::{Image, RgbImage};
-use yfslam_io::decode::{decode_color, decode_depth};
 use yfslam_io::depth::check_depth_factor;
 use yfslam_io::sequence::{AssociationReport, FrameEntry, Layout};
+use yfslam_io::stream::{open_color, open_depth};
 use yfslam_io::time::{format_stamp, seconds};
 use yfslam_io::{CameraSource, DepthStatistics, Sequence};
 
@@ -170,16 +170,14 @@ fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>)
 /// Opens the colour image, and the depth or right image; returns the colour and the depth image.
 fn open_images(entry: &FrameEntry, depth_source: DepthSource) -> Result<(RgbImage, Option<Image<u16>>)> {
     let (mut color, mut depth, mut right) = (RgbImage::default(), Image::default(), RgbImage::default());
-    let read = |path: &Path| std::fs::read(path).map_err(|error| anyhow::anyhow!("{}: {error}", path.display()));
-    let fault = |path: &Path, error| anyhow::anyhow!("{} {error}", path.display());
-    decode_color(&read(&entry.color_path)?, None, &mut color).map_err(|e| fault(&entry.color_path, e))?;
+    let mut bytes = Vec::new();
+    open_color(&entry.color, None, &mut bytes, &mut color)?;
     let Some(paired) = &entry.paired_image else { return Ok((color, None)) };
-    let bytes = read(&paired.path)?;
     if depth_source == DepthSource::Image {
-        decode_depth(&bytes, None, &mut depth).map_err(|e| fault(&paired.path, e))?;
+        open_depth(&paired.image, None, &mut bytes, &mut depth)?;
         return Ok((color, Some(depth)));
     }
-    decode_color(&bytes, None, &mut right).map_err(|e| fault(&paired.path, e))?;
+    open_color(&paired.image, None, &mut bytes, &mut right)?;
     Ok((color, None))
 }
 

@@ -12,9 +12,8 @@ use yfslam::Camera;
 use yfslam::config::DepthSource;
 
 use super::layout::{Calibration, Listing, stereo_or_mono};
-use super::lists::ListedFile;
 use super::pairs::{List, from_lists};
-use super::{GroundTruthReader, SequenceOptions};
+use super::{GroundTruthReader, ListedImage, SequenceOptions};
 use crate::camera::{CameraSource, check_camera};
 use crate::error::{Error, Result};
 use crate::rectify::{MountedCamera, StereoRectification};
@@ -41,8 +40,8 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     // Paths are relative to the folder of the whole sequence.
     let from_folder = |path: &Path| path.strip_prefix(folder).unwrap_or(path).to_owned();
     for entry in &mut entries {
-        entry.color_path = from_folder(&entry.color_path);
-        entry.paired_image.iter_mut().for_each(|paired| paired.path = from_folder(&paired.path));
+        entry.color.map_file(from_folder);
+        entry.paired_image.iter_mut().for_each(|paired| paired.image.map_file(from_folder));
     }
     let yaml = root.join("cam0/sensor.yaml");
     let left = read_camera(&yaml)?;
@@ -70,16 +69,16 @@ fn calibration(camera: Camera, yaml: &Path, rectification: Option<Arc<StereoRect
 fn read_list(camera: &Path) -> Result<List> {
     let path = camera.join("data.csv");
     let text = read_text(&path)?;
-    let file = |(number, line): (usize, &str)| {
+    let image = |(number, line): (usize, &str)| {
         let columns = line.split_once(',').map(|(stamp, name)| (stamp.trim(), name.trim()));
         let Some((stamp, name)) = columns.filter(|(_, name)| !name.is_empty()) else {
             let cure = "write 'nanoseconds,file', such as '1403636579763555584,1403636579763555584.png'";
             return Err(Error::line(&path, number, format!("'{line}' has another form"), cure));
         };
-        Ok(ListedFile { stamp_ns: nanoseconds(stamp, &path, number)?, path: camera.join("data").join(name) })
+        Ok(ListedImage { stamp_ns: nanoseconds(stamp, &path, number)?, image: camera.join("data").join(name).into() })
     };
-    let files = content_lines(&text).map(file).collect::<Result<_>>()?;
-    Ok(List { files, unstamped: 0, path })
+    let images = content_lines(&text).map(image).collect::<Result<_>>()?;
+    Ok(List { images, unstamped: 0, path })
 }
 
 fn nanoseconds(text: &str, path: &Path, number: usize) -> Result<i64> {

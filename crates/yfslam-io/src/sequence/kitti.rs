@@ -10,9 +10,8 @@ use yfslam::config::DepthSource;
 use yfslam::{Camera, RgbImage};
 
 use super::layout::{Calibration, Listing, stereo_or_mono};
-use super::lists::ListedFile;
 use super::pairs::{List, from_lists};
-use super::{GroundTruthReader, SequenceOptions};
+use super::{GroundTruthReader, ListedImage, SequenceOptions};
 use crate::camera::{CameraSource, check_camera};
 use crate::decode::decode_color;
 use crate::error::{Error, Result};
@@ -43,19 +42,19 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     let path = folder.join("times.txt");
     let stamps_ns = times(&path)?;
     let list_of = |camera: usize| {
-        let file = |(index, &stamp_ns): (usize, &i64)| ListedFile {
+        let image = |(index, &stamp_ns): (usize, &i64)| ListedImage {
             stamp_ns,
-            path: format!("image_{camera}/{index:06}.png").into(),
+            image: PathBuf::from(format!("image_{camera}/{index:06}.png")).into(),
         };
-        List { files: stamps_ns.iter().enumerate().map(file).collect(), unstamped: 0, path: path.clone() }
+        List { images: stamps_ns.iter().enumerate().map(image).collect(), unstamped: 0, path: path.clone() }
     };
     let right_images = (depth_source == DepthSource::Stereo).then(|| list_of(right));
     let (entries, report) = from_lists(folder, list_of(left), right_images, 0)?;
     let calib = folder.join("calib.txt");
     let text = read_text(&calib)?;
     let (p_left, p_right) = (projection(&text, left, &calib)?, projection(&text, right, &calib)?);
-    let camera =
-        camera(folder, &entries.first().map(|entry| folder.join(&entry.color_path)), &p_left, &p_right, &stamps_ns)?;
+    let first = entries.first().and_then(|entry| Some(folder.join(entry.color.file()?)));
+    let camera = camera(folder, &first, &p_left, &p_right, &stamps_ns)?;
     let camera = CameraSource::without_depth(camera, calib.display().to_string());
     check_camera(&camera)?;
     let calibration = Some(Calibration { camera, rectification: None });

@@ -6,6 +6,7 @@
 mod associate;
 pub(crate) mod euroc;
 mod ground_truth;
+mod image_ref;
 mod info;
 pub(crate) mod kitti;
 mod layout;
@@ -20,9 +21,9 @@ use yfslam::config::DepthSource;
 use crate::error::{Error, Result};
 use crate::time::TimeMirror;
 pub use ground_truth::GroundTruthReader;
+pub use image_ref::{ImageRef, ListedImage};
 pub use info::{SequenceInfo, TimeOffset};
 pub use layout::{Calibration, Layout};
-use lists::ListedFile;
 
 /// Options for reading a sequence, and the part of it that is played.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,15 +47,15 @@ impl Default for SequenceOptions {
     }
 }
 
-/// The image files of one frame.
+/// The images of one frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameEntry {
     /// Time of the colour image and the frame, ns.
     pub timestamp_ns: i64,
     /// The colour image.
-    pub color_path: PathBuf,
+    pub color: ImageRef,
     /// The depth image or the right image, depending on [`Sequence::depth_source`]; `None` for a monocular camera.
-    pub paired_image: Option<ListedFile>,
+    pub paired_image: Option<ListedImage>,
 }
 
 /// Result of the association, for the whole sequence.
@@ -117,20 +118,17 @@ impl Sequence {
         let layout::Listing { depth_source, mut entries, mut report, calibration, ground_truth } =
             layout.list(folder, options)?;
         for entry in &mut entries {
-            entry.color_path = folder.join(&entry.color_path);
+            entry.color.map_file(|path| folder.join(path));
             if let Some(paired) = &mut entry.paired_image {
-                paired.path = folder.join(&paired.path);
+                paired.image.map_file(|path| folder.join(path));
             }
         }
         report.paired = entries.len();
         report.missing_files = entries.iter().filter(|entry| entry.missing().is_some()).count();
         if let Some(first) = entries.first().filter(|_| report.missing_files == report.paired) {
-            let missing = first.missing().unwrap_or(&first.color_path);
-            let problem = format!(
-                "none of its {} frames has all its image files; the first missing is {}",
-                report.paired,
-                missing.display()
-            );
+            let missing = first.missing().unwrap_or(&first.color);
+            let problem =
+                format!("none of its {} frames has all its image files; the first missing is {missing}", report.paired);
             return Err(Error::content(folder, problem, "unpack the images beside the lists"));
         }
         let (entries, mirror) = cut(folder, entries, options)?;
@@ -141,9 +139,9 @@ impl Sequence {
 
 impl FrameEntry {
     /// Returns the first of its files that does not exist.
-    fn missing(&self) -> Option<&Path> {
-        let paired = self.paired_image.iter().map(|paired| paired.path.as_path());
-        std::iter::once(self.color_path.as_path()).chain(paired).find(|path| !path.is_file())
+    fn missing(&self) -> Option<&ImageRef> {
+        let paired = self.paired_image.iter().map(|paired| &paired.image);
+        std::iter::once(&self.color).chain(paired).find(|image| image.is_missing())
     }
 }
 

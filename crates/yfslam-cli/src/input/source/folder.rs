@@ -164,6 +164,7 @@ fn reason(fault: &FrameFault) -> &'static str {
             DecodeError::WrongSize { .. } | DecodeError::TooLarge(_) => "wrong size of image",
             DecodeError::Damaged(_) => "damaged image",
         },
+        FrameFault::NotListed => "missing file",
         FrameFault::NoDepth { .. } => "no depth in any pixel",
         FrameFault::DecoderStopped => "decoder stopped",
     }
