@@ -30,6 +30,7 @@
 //! ```
 
 mod atomic_file;
+pub mod bag;
 pub mod boxes;
 pub mod camera;
 pub mod decode;

@@ -12,7 +12,7 @@ use super::intrinsics::{has_camera_file, open3d_camera};
 use super::layout::{Listing, missing_images};
 use super::lists::ListedFile;
 use super::pairs::{List, from_lists};
-use super::{AssociationReport, FrameEntry, GroundTruthReader, SequenceOptions};
+use super::{AssociationReport, FrameEntry, GroundTruthReader, ListedImage, SequenceOptions};
 use crate::error::{Error, Result};
 
 /// Names of folders of colour images, the most usual first.
@@ -74,7 +74,8 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     };
     let color = images_of(&folders.color)?;
     let depth = folders.depth.as_deref().filter(|_| depth_source == DepthSource::Image).map(images_of).transpose()?;
-    let images = Images { color, depth, color_folder: &folders.color, folder };
+    let depth_folder = folders.depth.as_deref().unwrap_or(folder);
+    let images = Images { color, depth, color_folder: &folders.color, depth_folder, folder };
     let (entries, report, notes) = images.pair(options)?;
     let calibration =
         if options.read_calibration && !has_camera_file(folder) { open3d_camera(folder, options.fps())? } else { None };
@@ -100,8 +101,9 @@ pub struct Images<'a> {
     pub color: Vec<NamedImage>,
     /// `None` for a single camera.
     pub depth: Option<Vec<NamedImage>>,
-    /// Named in messages.
+    /// The folders, named in messages.
     pub color_folder: &'a Path,
+    pub depth_folder: &'a Path,
     pub folder: &'a Path,
 }
 
@@ -111,12 +113,21 @@ pub type Paired = (Vec<FrameEntry>, AssociationReport, Vec<String>);
 impl Images<'_> {
     /// Pairs colour and depth: by time stamp if the names are time stamps, else by number, else by order.
     pub fn pair(self, options: &SequenceOptions) -> Result<Paired> {
-        let list = |files: Vec<ListedFile>| List { files, unstamped: 0, path: self.color_folder.to_owned() };
+        let list = |files: Vec<ListedFile>, folder: &Path| List {
+            images: files.into_iter().map(ListedImage::from).collect(),
+            unstamped: 0,
+            path: folder.to_owned(),
+        };
         let (color, depth) = (stamped(&self.color), self.depth.as_deref().map(stamped));
         let all_are_stamps = color.is_some() && depth.as_ref().is_none_or(Option::is_some) && options.fps.is_none();
         if let Some(color) = color.filter(|_| all_are_stamps) {
             let tolerance_ns = options.association_tolerance_ns;
-            let (entries, report) = from_lists(self.folder, list(color), depth.flatten().map(list), tolerance_ns)?;
+            let (entries, report) = from_lists(
+                self.folder,
+                list(color, self.color_folder),
+                depth.flatten().map(|depth| list(depth, self.depth_folder)),
+                tolerance_ns,
+            )?;
             return Ok((entries, report, vec!["the names of the images are their time stamps".into()]));
         }
         let fps = options.fps();
@@ -129,10 +140,10 @@ impl Images<'_> {
             }
         };
         let files = numbered(&color, None, fps);
-        let (mut entries, mut report) = from_lists(self.folder, list(files), None, 0)?;
+        let (mut entries, mut report) = from_lists(self.folder, list(files, self.color_folder), None, 0)?;
         if let Some(depth) = depth {
             for (entry, depth) in entries.iter_mut().zip(depth) {
-                entry.paired_image = Some(ListedFile { stamp_ns: entry.timestamp_ns, path: depth.path });
+                entry.paired_image = Some(ListedImage { stamp_ns: entry.timestamp_ns, image: depth.path.into() });
             }
         }
         [report.color_listed, report.paired_images_listed] = listed;

@@ -1,21 +1,30 @@
-//! A recorded sequence: a folder in the layout of the TUM RGB-D benchmark, which the Bonn data set shares, or of the stereo benchmarks
-//! EuRoC and KITTI.
+//! A recorded sequence: a folder in the layout of a data set, such as TUM RGB-D, EuRoC or ScanNet, or as recorders write it.
 //!
 //! In: the folder and [`SequenceOptions`]. Out: the frames in order, and a report of what was skipped and why.
 
 mod associate;
+mod csv;
 mod detect;
+mod eth3d;
 pub(crate) mod euroc;
 mod folders;
 mod ground_truth;
+mod icl_nuim;
+mod image_ref;
 mod images;
 mod info;
 mod intrinsics;
 pub(crate) mod kitti;
 mod layout;
 pub mod lists;
+mod matrices;
+mod openloris;
 mod pairs;
+mod replica;
+mod scannet;
+mod seven_scenes;
 mod tum;
+mod vslam_lab;
 
 use std::path::{Path, PathBuf};
 
@@ -24,9 +33,9 @@ use yfslam::config::DepthSource;
 use crate::error::{Error, Result};
 use crate::time::TimeMirror;
 pub use ground_truth::GroundTruthReader;
+pub use image_ref::{ImageRef, ListedImage};
 pub use info::{SequenceInfo, TimeOffset};
 pub use layout::{Calibration, Layout};
-use lists::ListedFile;
 
 /// Options for reading a sequence, and the part of it that is played.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,15 +96,15 @@ impl SequenceOptions {
     }
 }
 
-/// The image files of one frame.
+/// The images of one frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameEntry {
     /// Time of the colour image and the frame, ns.
     pub timestamp_ns: i64,
     /// The colour image.
-    pub color_path: PathBuf,
+    pub color: ImageRef,
     /// The depth image or the right image, depending on [`Sequence::depth_source`]; `None` for a monocular camera.
-    pub paired_image: Option<ListedFile>,
+    pub paired_image: Option<ListedImage>,
 }
 
 /// Result of the association, for the whole sequence.
@@ -142,6 +151,8 @@ pub struct Sequence {
     pub calibration: Option<Calibration>,
     /// Reader of the ground truth.
     pub ground_truth: GroundTruthReader,
+    /// File of the calibration that was not read because the caller has a camera of its own.
+    pub unread_calibration: Option<PathBuf>,
     /// Why the folder was taken for this layout.
     pub because: String,
     /// What was assumed or changed when the sequence was read, one sentence each.
@@ -165,33 +176,43 @@ impl Sequence {
         let layout::Listing { depth_source, mut entries, mut report, calibration, ground_truth, notes } =
             layout.list(folder, options)?;
         for entry in &mut entries {
-            entry.color_path = folder.join(&entry.color_path);
+            entry.color.map_file(|path| folder.join(path));
             if let Some(paired) = &mut entry.paired_image {
-                paired.path = folder.join(&paired.path);
+                paired.image.map_file(|path| folder.join(path));
             }
         }
         report.paired = entries.len();
         report.missing_files = entries.iter().filter(|entry| entry.missing().is_some()).count();
         if let Some(first) = entries.first().filter(|_| report.missing_files == report.paired) {
-            let missing = first.missing().unwrap_or(&first.color_path);
-            let problem = format!(
-                "none of its {} frames has all its image files; the first missing is {}",
-                report.paired,
-                missing.display()
-            );
+            let missing = first.missing().unwrap_or(&first.color);
+            let problem =
+                format!("none of its {} frames has all its image files; the first missing is {missing}", report.paired);
             return Err(Error::content(folder, problem, "unpack the images beside the lists"));
         }
+        let unread_calibration = layout.calibration_file(folder).filter(|_| !options.read_calibration);
         let (entries, mirror) = cut(folder, entries, options)?;
         let folder = folder.into();
-        Ok(Self { folder, layout, depth_source, entries, report, mirror, calibration, ground_truth, because, notes })
+        Ok(Self {
+            unread_calibration,
+            folder,
+            layout,
+            depth_source,
+            entries,
+            report,
+            mirror,
+            calibration,
+            ground_truth,
+            because,
+            notes,
+        })
     }
 }
 
 impl FrameEntry {
     /// Returns the first of its files that does not exist.
-    fn missing(&self) -> Option<&Path> {
-        let paired = self.paired_image.iter().map(|paired| paired.path.as_path());
-        std::iter::once(self.color_path.as_path()).chain(paired).find(|path| !path.is_file())
+    fn missing(&self) -> Option<&ImageRef> {
+        let paired = self.paired_image.iter().map(|paired| &paired.image);
+        std::iter::once(&self.color).chain(paired).find(|image| image.is_missing())
     }
 }
 

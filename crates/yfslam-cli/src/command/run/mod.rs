@@ -156,6 +156,7 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         source.name
     );
     source.notes.iter().for_each(|note| terminal.note(note));
+    source.warnings.iter().for_each(|warning| terminal.warn(warning));
     if let Some(masks) = &source.masks {
         report_masks(masks, terminal);
     }

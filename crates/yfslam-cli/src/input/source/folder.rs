@@ -1,6 +1,7 @@
 //! Recorded sequences: folders in one of the layouts that `yfslam-io` detects.
 
 use std::io::ErrorKind;
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
@@ -11,8 +12,8 @@ use yfslam_io::camera::check_camera;
 use yfslam_io::decode::DecodeError;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
 use yfslam_io::{
-    BoxList, CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, detect_camera,
-    load_camera,
+    BoxList, CameraSource, DepthStatistics, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording,
+    detect_camera, load_camera,
 };
 
 use super::Source;
@@ -32,7 +33,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     if !camera.unused_keys.is_empty() {
         tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "keys of the camera file that are not used");
     }
-    check(&sequence, &camera)?;
+    let depths = check(&sequence, &camera)?;
     let boxes = match own_boxes {
         Some(classes) => Some(BoxList::read(&args.boxes_file())?.detections(classes)),
         None => None,
@@ -44,9 +45,16 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();
     let mut notes = vec![recognised(&sequence, &camera)];
     notes.extend(sequence.notes.iter().cloned());
+    notes.extend(replaced_camera(args, &sequence));
+    let mut warnings: Vec<String> = depths.and_then(|depths| depths.warning(camera.depth_factor)).into_iter().collect();
+    if sequence.report.from_associations_file && args.association_tolerance.is_some() {
+        let text = "--association-tolerance has no effect: the list already has the pairs of colour and depth images";
+        warnings.push(text.into());
+    }
     Ok(Source {
         name: name(args),
         notes,
+        warnings,
         camera,
         depth_source: sequence.depth_source,
         frames: Frames::new(Player::Folder(Box::new((stream, extras))), sequence.depth_source, args, &stamps_ns),
@@ -60,12 +68,15 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
 
 /// Checks camera and depth factor against the first frames or, if those are unusable, against frames of the whole sequence: some sensors
 /// deliver unusable frames at the start.
-fn check(sequence: &Sequence, camera: &CameraSource) -> Result<()> {
-    let Err(error) = check_recording(sequence, camera) else { return Ok(()) };
+fn check(sequence: &Sequence, camera: &CameraSource) -> Result<Option<DepthStatistics>> {
+    let error = match check_recording(sequence, camera) {
+        Ok(depths) => return Ok(depths),
+        Err(error) => error,
+    };
     let step = sequence.entries.len().div_ceil(PROBES).max(1);
     let entries = sequence.entries.iter().step_by(step).cloned().collect();
     match (&error, check_recording(&Sequence { entries, ..sequence.clone() }, camera)) {
-        (Error::Content { .. }, Ok(_)) => Ok(()),
+        (Error::Content { .. }, Ok(depths)) => Ok(depths),
         _ => Err(error.into()),
     }
 }
@@ -98,6 +109,17 @@ pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequ
     let sequence = Sequence::open(args.folder(), &options)?;
     let camera = camera(args, &sequence);
     Ok((sequence, camera))
+}
+
+/// Names the camera of the folder that --camera replaces.
+fn replaced_camera(args: &SourceArgs, sequence: &Sequence) -> Option<String> {
+    let given = args.camera.as_ref()?;
+    let own =
+        ["camera.toml", "camera.yaml", "camera.yml", "camera_intrinsic.json", "intrinsic.json", "calibration.txt"];
+    let own = own.iter().map(|name| args.folder().join(name)).find(|path| path.is_file());
+    let own = own.or_else(|| sequence.unread_calibration.clone())?;
+    let is_same = Path::new(given).canonicalize().ok().is_some_and(|given| own.canonicalize().ok() == Some(given));
+    (!is_same).then(|| format!("--camera {given} is used; {} is not read", own.display()))
 }
 
 fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
@@ -181,6 +203,7 @@ fn reason(fault: &FrameFault) -> &'static str {
             DecodeError::WrongSize { .. } | DecodeError::TooLarge(_) => "wrong size of image",
             DecodeError::Damaged(_) => "damaged image",
         },
+        FrameFault::NotListed => "missing file",
         FrameFault::NoDepth { .. } => "no depth in any pixel",
         FrameFault::DecoderStopped => "decoder stopped",
     }

@@ -66,6 +66,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     Ok(Source {
         name: name.into(),
         notes: Vec::new(),
+        warnings: Vec::new(),
         camera: world_camera(&config),
         mirror: part.mirror,
         depth_source,
