@@ -222,4 +222,6 @@ fn check_size(found: ImageSize, expected: Option<ImageSize>, cure: &'static str)
 }
 
 #[cfg(test)]
+mod format_tests;
+#[cfg(test)]
 mod tests;
