@@ -37,6 +37,7 @@ pub mod decode;
 pub mod depth;
 pub mod error;
 pub mod faults;
+pub mod message;
 pub mod rectify;
 pub mod sequence;
 pub mod stream;
