@@ -86,6 +86,9 @@ mod tests {
             entries: stamps.iter().map(entry).collect(),
             report: AssociationReport::default(),
             mirror: None,
+            unread_calibration: None,
+            because: String::new(),
+            notes: Vec::new(),
         }
     }
 

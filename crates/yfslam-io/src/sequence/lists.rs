@@ -89,7 +89,7 @@ pub fn color_is_second(pairs: &[[ListedFile; 2]]) -> Option<bool> {
 }
 
 /// Returns whether the words in the path name a depth image or a colour image; `None` for neither.
-fn names_depth(path: &Path) -> Option<bool> {
+pub(super) fn names_depth(path: &Path) -> Option<bool> {
     let name = path.to_string_lossy().to_lowercase();
     if name.contains("depth") {
         return Some(true);

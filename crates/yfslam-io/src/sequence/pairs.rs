@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::associate::associate;
-use super::lists::{ListedFile, color_is_second, parse_file_list, parse_pair_list};
+use super::lists::{ListedFile, color_is_second, names_depth, parse_file_list, parse_pair_list};
 use super::{AssociationReport, FrameEntry, ListedImage};
 use crate::error::{Error, Result};
 use crate::text::read_text;
@@ -78,7 +78,11 @@ pub fn from_lists(
             |color: ListedImage| FrameEntry { timestamp_ns: color.stamp_ns, color: color.image, paired_image: None };
         return Ok((color.into_iter().map(alone).collect(), report));
     };
-    let what = if paired.path.ends_with("depth.txt") { "depth image" } else { "right image" };
+    let what = if paired.path.file_name().is_some_and(|name| names_depth(name.as_ref()) == Some(true)) {
+        "depth image"
+    } else {
+        "right image"
+    };
     let paired = paired.in_order(&mut report)?;
     let stamps = |images: &[ListedImage]| images.iter().map(|image| image.stamp_ns).collect::<Vec<_>>();
     let pairs = associate(&stamps(&color), &stamps(&paired), tolerance_ns);

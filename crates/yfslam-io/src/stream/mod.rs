@@ -10,10 +10,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use yfslam::config::DepthSource;
-use yfslam::{DepthImage, Frame, Image, RgbImage};
+use yfslam::{DepthImage, Frame, RgbImage};
 
 use crate::camera::CameraSource;
-use crate::decode::{DecodeError, ImageSize, decode_color, decode_depth};
+use crate::decode::{DecodeError, ImageSize, decode_color, decode_depth_image};
+use crate::depth_resampling::DepthResampling;
 use crate::error::Result;
 use crate::rectify::{Remap, StereoRectification};
 use crate::sequence::{FrameEntry, ImageRef, Sequence};
@@ -59,8 +60,9 @@ impl FrameStream {
         let camera = &source.camera;
         let entries: Arc<[FrameEntry]> = sequence.entries.as_slice().into();
         let size = ImageSize { width: camera.width, height: camera.height };
-        let metres_per_unit = (1.0 / source.depth_factor) as f32;
-        let rectification = sequence.calibration.as_ref().and_then(|calibration| calibration.rectification.clone());
+        let calibration = sequence.calibration.as_ref();
+        let rectification = calibration.and_then(|calibration| calibration.rectification.clone());
+        let resampling = calibration.and_then(|calibration| calibration.depth_resampling.clone());
         let mut read_left = ColorReader { size, bytes: Vec::new(), rectification };
         let mut read_right = ColorReader { bytes: Vec::new(), ..read_left.clone() };
         let color = PrefetchQueue::start("yfslam-color", entries.clone(), look_ahead, move |entry| {
@@ -69,7 +71,10 @@ impl FrameStream {
         let mut bytes = Vec::new();
         let paired_images = match sequence.depth_source {
             DepthSource::Image => {
-                let read = move |entry: &FrameEntry| read_depth(paired(entry), size, metres_per_unit, &mut bytes);
+                let depth_factor = source.depth_factor;
+                let read = move |entry: &FrameEntry| {
+                    read_depth(paired(entry), size, depth_factor, resampling.as_deref(), &mut bytes)
+                };
                 PairedImages::Depth(PrefetchQueue::start("yfslam-depth", entries.clone(), look_ahead, read)?)
             }
             DepthSource::Stereo => {
@@ -172,14 +177,20 @@ impl ColorReader {
 fn read_depth(
     image: Option<&ImageRef>,
     size: ImageSize,
-    metres_per_unit: f32,
+    depth_factor: f64,
+    resampling: Option<&DepthResampling>,
     bytes: &mut Vec<u8>,
 ) -> std::result::Result<DepthImage, FrameFault> {
     let image = image.ok_or(FrameFault::NotListed)?;
-    let mut depth = DepthImage { metres_per_unit, ..Default::default() };
-    open_depth(image, Some(size), bytes, &mut depth.raw)?;
+    let mut depth = DepthImage::default();
+    let size =
+        resampling.map_or(size, |resampling| ImageSize { width: resampling.from[0], height: resampling.from[1] });
+    open_depth(image, Some(size), depth_factor, bytes, &mut depth)?;
     if depth.raw.data().iter().all(|&raw| raw == 0) {
         return Err(FrameFault::NoDepth { image: image.clone() });
+    }
+    if let Some(resampling) = resampling {
+        depth.raw = resampling.apply(&depth.raw);
     }
     Ok(depth)
 }
@@ -202,18 +213,19 @@ pub fn open_color(
     decode_color(bytes, expected, into).map_err(|error| image_fault(image, error))
 }
 
-/// Reads and decodes a depth image, as [`decode_depth`] does. `bytes` is a buffer that may be reused.
+/// Reads and decodes a depth image, as [`decode_depth_image`] does. `bytes` is a buffer that may be reused.
 ///
 /// # Errors
 /// The file or message cannot be read, or is not such an image.
 pub fn open_depth(
     image: &ImageRef,
     expected: Option<ImageSize>,
+    depth_factor: f64,
     bytes: &mut Vec<u8>,
-    into: &mut Image<u16>,
+    into: &mut DepthImage,
 ) -> std::result::Result<(), FrameFault> {
     image.read(bytes).map_err(FrameFault::Unreadable)?;
-    decode_depth(bytes, expected, into).map_err(|error| image_fault(image, error))
+    decode_depth_image(bytes, expected, depth_factor, into).map_err(|error| image_fault(image, error))
 }
 
 fn image_fault(image: &ImageRef, source: DecodeError) -> FrameFault {

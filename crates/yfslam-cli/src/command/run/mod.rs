@@ -155,6 +155,8 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         "--dense needs depth images, which {} does not have or --sensor leaves unused; leave it out",
         source.name
     );
+    source.notes.iter().for_each(|note| terminal.note(note));
+    source.warnings.iter().for_each(|warning| terminal.warn(warning));
     if let Some(masks) = &source.masks {
         report_masks(masks, terminal);
     }

@@ -31,6 +31,10 @@ pub use synth::world_camera;
 pub struct Source {
     /// Short name, for folders and tables.
     pub name: String,
+    /// What the sequence was taken for, and what was assumed, one sentence each.
+    pub notes: Vec<String>,
+    /// What is probably a mistake, one sentence each.
+    pub warnings: Vec<String>,
     /// The camera, checked.
     pub camera: CameraSource,
     /// Where depth comes from.
