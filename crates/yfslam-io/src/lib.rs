@@ -49,6 +49,7 @@ pub mod trajectory;
 pub mod write;
 
 pub use atomic_file::{prepare_folder, write_atomically};
+pub use bag::Bag;
 pub use boxes::BoxList;
 pub use camera::{CameraSource, detect_camera, load_camera};
 pub use depth::{DepthStatistics, check_recording};

@@ -19,10 +19,12 @@ mod ros1;
 mod topics;
 mod walk;
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::message::{ImageHead, MessageType};
 use compression::unpack_message;
 use file::BagFile;
 pub use file::Position;
@@ -49,9 +51,13 @@ pub struct Visited {
     pub notes: Vec<String>,
 }
 
-/// Returns whether `path` is a bag: a file of ROS 1, MCAP or SQLite, or a folder of them with a `metadata.yaml`.
+/// Extensions of the files of bags.
+const EXTENSIONS: [&str; 4] = ["bag", "active", "mcap", "db3"];
+
+/// Returns whether `path` is a bag: a file that begins like one or is named so, or a folder with the `metadata.yaml` of rosbag2.
 pub fn is_bag(path: &Path) -> bool {
-    folder::is_bag_folder(path) || file::has_magic(path)
+    let is_named = || EXTENSIONS.iter().any(|name| path.extension().is_some_and(|extension| extension == *name));
+    folder::is_bag_folder(path) || (path.is_file() && (is_named() || file::has_magic(path)))
 }
 
 impl Bag {
@@ -79,7 +85,8 @@ impl Bag {
             walk = Walk::new(index as u32, &mut self.topics, &[], &mut visit);
             *walk.topics = before;
             walk.counts = true;
-            walk.file(file)?;
+            // Nothing breaks off a visit that only counts.
+            let _ = walk.file(file)?;
             let path = file.path().display();
             walk.notes.insert(0, format!("{path} has no index, because its recording did not end properly or a part of it is missing; it was read message by message"));
         }
@@ -128,6 +135,29 @@ impl Bag {
             }
         }
         Ok(visited)
+    }
+
+    /// Returns the encodings or formats of the images, by the index of their topic, from the first message of each.
+    ///
+    /// # Errors
+    /// A file cannot be read.
+    pub fn encodings(&self) -> Result<BTreeMap<usize, String>> {
+        let is_image = |topic: &Topic| {
+            topic.wire.is_some() && matches!(topic.kind, Some(MessageType::Image | MessageType::CompressedImage))
+        };
+        let need = |topic: &Topic| if is_image(topic) { Need::Head } else { Need::Skip };
+        let needs: Vec<Need> = self.topics().iter().map(need).collect();
+        let awaited = self.topics().iter().filter(|topic| is_image(topic) && topic.messages > 0).count();
+        let mut encodings = BTreeMap::new();
+        self.visit(&needs, &mut |found| {
+            let kind = self.topics().get(found.topic).and_then(|topic| topic.kind.zip(topic.wire));
+            if let Some(Ok(head)) = kind.map(|(kind, wire)| ImageHead::read(kind, wire, found.bytes)) {
+                let size = head.size.map_or(String::new(), |size| format!(" {size}"));
+                encodings.entry(found.topic).or_insert(format!("{}{size}", head.encoding));
+            }
+            if encodings.len() < awaited { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        })?;
+        Ok(encodings)
     }
 
     /// Reads a message into `bytes` and drops their old content.

@@ -34,6 +34,8 @@ pub enum Need {
 pub struct Found<'a> {
     /// Index of its topic.
     pub topic: usize,
+    /// When the recorder received it, ns.
+    pub received_ns: i64,
     /// Where it is.
     pub position: Position,
     /// The bytes that are needed.
@@ -240,7 +242,7 @@ impl<'a> Walk<'a> {
             self.note(format!("a message at byte {} is damaged ({problem}) and left out", position.offset));
             return Ok(());
         }
-        match (self.visit)(Found { topic, position, bytes: &bytes }) {
+        match (self.visit)(Found { topic, received_ns: time_ns, position, bytes: &bytes }) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Stop::Done),
         }

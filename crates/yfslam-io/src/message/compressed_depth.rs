@@ -3,9 +3,9 @@
 //! In: a `CompressedImage` with 12 bytes (codec, two parameters of the quantisation) and a PNG, or width, height and RVL (Wilson, "Fast
 //! lossless depth image compression", ISS 2017). Out: depth; that of 32 bits was stored as 16-bit inverse depth.
 
-use yfslam::Image;
+use yfslam::{DepthImage, Image};
 
-use super::depth::{KIND_CURE, SIZE_CURE, units};
+use super::depth::{KIND_CURE, SIZE_CURE, metres_factor, units};
 use super::types::CompressedImage;
 use crate::decode::{DecodeError, ImageSize, check_size, decode_depth};
 
@@ -16,10 +16,11 @@ pub fn decode(
     image: &CompressedImage<'_>,
     depth_factor: f64,
     expected: Option<ImageSize>,
-    into: &mut Image<u16>,
+    into: &mut DepthImage,
 ) -> Result<(), DecodeError> {
+    into.metres_per_unit = (1.0 / depth_factor) as f32;
     if image.data.starts_with(PNG) {
-        return decode_depth(image.data, expected, into);
+        return decode_depth(image.data, expected, &mut into.raw);
     }
     let format = image.format;
     if !format.contains("compressedDepth") {
@@ -32,9 +33,9 @@ pub fn decode(
         return Err(DecodeError::Damaged(format!("{} bytes are too few for compressed depth", image.data.len())));
     };
     if rest.starts_with(PNG) {
-        decode_depth(rest, expected, into)?;
+        decode_depth(rest, expected, &mut into.raw)?;
     } else if format.contains("rvl") {
-        decode_rvl(rest, expected, into)?;
+        decode_rvl(rest, expected, &mut into.raw)?;
     } else {
         return Err(DecodeError::WrongKind {
             found: format!("compressed depth in format '{format}'"),
@@ -47,8 +48,10 @@ pub fn decode(
             bytes.map_or(0.0, |bytes| f32::from_le_bytes(*bytes))
         };
         let (a, b) = (parameter(4), parameter(8));
-        let of_inverse = |raw: u16| if raw == 0 { 0 } else { units(a / (f32::from(raw) - b), depth_factor) };
-        into.data_mut().iter_mut().for_each(|raw| *raw = of_inverse(*raw));
+        let metres_factor = metres_factor(depth_factor);
+        into.metres_per_unit = (1.0 / metres_factor) as f32;
+        let of_inverse = |raw: u16| if raw == 0 { 0 } else { units(a / (f32::from(raw) - b), metres_factor) };
+        into.raw.data_mut().iter_mut().for_each(|raw| *raw = of_inverse(*raw));
     }
     Ok(())
 }

@@ -7,10 +7,11 @@ mod bayer;
 mod color;
 mod compressed_depth;
 mod depth;
+pub use depth::METRES_UNITS;
 pub mod types;
 pub mod wire;
 
-use yfslam::RgbImage;
+use yfslam::{DepthImage, RgbImage};
 
 use self::types::{CompressedImage, Image};
 use self::wire::{Reader, Wire, WireError};
@@ -114,8 +115,9 @@ pub fn decode_color_message(
     decode_color(image.data, expected, into)
 }
 
-/// Decodes the depth image of an `Image` or `CompressedImage` into `into`, whose buffer is reused. Depth in metres is rounded to
-/// `depth_factor` units per metre; what is not in their range is not measured.
+/// Decodes the depth image of an `Image` or `CompressedImage` into `into`, whose buffer is reused. Integers have `depth_factor` units per
+/// metre, and 65535 is no measurement. Depth in metres is rounded to such units, or to [`METRES_UNITS`] where they would be coarse; what
+/// is not in their range is not measured.
 ///
 /// # Errors
 /// [`DecodeError`], as for an image file; also an encoding that is not understood.
@@ -125,7 +127,7 @@ pub fn decode_depth_message(
     bytes: &[u8],
     depth_factor: f64,
     expected: Option<ImageSize>,
-    into: &mut yfslam::Image<u16>,
+    into: &mut DepthImage,
 ) -> Result<(), DecodeError> {
     let mut from = Reader::new(wire, bytes).map_err(damaged)?;
     if kind == MessageType::CompressedImage {
