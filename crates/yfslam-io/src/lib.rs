@@ -38,6 +38,7 @@ pub mod depth;
 mod depth_resampling;
 pub mod error;
 pub mod faults;
+pub mod message;
 pub mod rectify;
 pub mod sequence;
 pub mod stream;
@@ -48,6 +49,7 @@ pub mod trajectory;
 pub mod write;
 
 pub use atomic_file::{prepare_folder, write_atomically};
+pub use bag::Bag;
 pub use boxes::BoxList;
 pub use camera::{CameraSource, detect_camera, load_camera};
 pub use depth::{DepthStatistics, check_recording};

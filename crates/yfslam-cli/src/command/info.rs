@@ -7,13 +7,14 @@ use anyhow::Result;
 use clap::Args;
 use yfslam::config::DepthSource;
 use yfslam::{DepthImage, RgbImage};
+use yfslam_io::bag::is_bag;
 use yfslam_io::depth::check_depth_factor;
 use yfslam_io::sequence::{AssociationReport, FrameEntry, Layout};
 use yfslam_io::stream::{open_color, open_depth};
 use yfslam_io::time::{format_stamp, seconds};
 use yfslam_io::{CameraSource, DepthStatistics, Sequence};
 
-use crate::input::source::{SourceArgs, open_sequence, world_camera};
+use crate::input::source::{SourceArgs, describe_bag, open_sequence, world_camera};
 use crate::ui::terminal::{explain, print};
 
 /// Number of frames that are opened, spread evenly over the sequence.
@@ -38,9 +39,15 @@ pub fn run(args: &InfoArgs) -> Result<()> {
 }
 
 fn recorded(args: &SourceArgs) -> Result<String> {
-    let (sequence, camera) = open_sequence(args, DepthSource::Image)?;
-    let mut text = String::new();
-    writeln!(text, "{}", sequence.folder.display())?;
+    let topics = if is_bag(args.folder()) { describe_bag(args.folder())? } else { String::new() };
+    let mut text = format!("{}\n{topics}", args.folder().display());
+    let (sequence, camera) = match open_sequence(args, DepthSource::Image) {
+        Err(error) if !topics.is_empty() => {
+            writeln!(text, "frames        none: {}", explain(&error))?;
+            return Ok(text);
+        }
+        opened => opened?,
+    };
     writeln!(text, "kind          {}, {}", sequence.layout.name(), sensor(sequence.depth_source))?;
     writeln!(text, "              recognised: {}", sequence.because)?;
     for note in &sequence.notes {

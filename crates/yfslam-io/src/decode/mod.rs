@@ -211,7 +211,7 @@ impl Format {
 }
 
 /// Checks a size from a header before anything is allocated for it.
-fn check_size(found: ImageSize, expected: Option<ImageSize>, cure: &'static str) -> Result<(), DecodeError> {
+pub(crate) fn check_size(found: ImageSize, expected: Option<ImageSize>, cure: &'static str) -> Result<(), DecodeError> {
     if found.width.checked_mul(found.height).is_none_or(|pixels| pixels > MAX_PIXELS) {
         return Err(DecodeError::TooLarge(found));
     }

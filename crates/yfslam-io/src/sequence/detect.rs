@@ -21,6 +21,9 @@ pub fn layout(folder: &Path, options: &SequenceOptions) -> (Layout, String) {
         return (Layout::Folders, "--color and --depth".into());
     }
     let because = |text: &str| text.to_owned();
+    if crate::bag::is_bag(folder) {
+        return (Layout::Bag, because("it begins like a bag or is named so"));
+    }
     if let Some(root) = euroc::root(folder) {
         return (Layout::Euroc, format!("it holds {}", root.join("cam0/data.csv").display()));
     }

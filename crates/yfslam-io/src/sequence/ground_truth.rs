@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use super::{csv, euroc, icl_nuim, kitti, matrices};
 use crate::error::Result;
 use crate::text::read_text;
-use crate::trajectory::TrajectoryFile;
+use crate::trajectory::{StampedPose, TrajectoryFile};
 
 /// Reads the ground truth of a sequence.
 #[derive(Clone, Debug)]
@@ -36,6 +36,8 @@ enum Format {
     IclNuim(f64),
     /// A table whose header names the columns.
     Csv,
+    /// Poses of the camera that were read from a bag.
+    Bag(Vec<StampedPose>),
 }
 
 impl GroundTruthReader {
@@ -68,6 +70,16 @@ impl GroundTruthReader {
         Self { path: Some(path), format: Format::Csv }
     }
 
+    /// Makes a reader of poses that were read from the bag at `path`.
+    pub(super) fn bag(path: PathBuf, poses: Vec<StampedPose>) -> Self {
+        Self { path: Some(path), format: Format::Bag(poses) }
+    }
+
+    /// Makes a reader of a sequence without ground truth.
+    pub(super) fn none() -> Self {
+        Self { path: None, format: Format::Tum }
+    }
+
     /// Returns the file, or the folder of the pose files, if it exists.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref().filter(|path| path.exists())
@@ -78,6 +90,11 @@ impl GroundTruthReader {
     /// # Errors
     /// The file cannot be read, or a line is malformed.
     pub fn read(&self, path: &Path) -> Result<TrajectoryFile> {
+        if let Format::Bag(poses) = &self.format
+            && self.path.as_deref() == Some(path)
+        {
+            return TrajectoryFile::from_poses(poses.clone(), path);
+        }
         if let Format::PoseFiles(frames) = &self.format
             && path.is_dir()
         {

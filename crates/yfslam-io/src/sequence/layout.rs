@@ -8,8 +8,8 @@ use std::sync::Arc;
 use yfslam::config::DepthSource;
 
 use super::{
-    AssociationReport, FrameEntry, GroundTruthReader, SequenceOptions, detect, eth3d, euroc, folders, icl_nuim, kitti,
-    openloris, replica, scannet, seven_scenes, tum, vslam_lab,
+    AssociationReport, FrameEntry, GroundTruthReader, SequenceOptions, bag, detect, eth3d, euroc, folders, icl_nuim,
+    kitti, openloris, replica, scannet, seven_scenes, tum, vslam_lab,
 };
 use crate::camera::CameraSource;
 use crate::depth_resampling::DepthResampling;
@@ -41,6 +41,8 @@ pub enum Layout {
     ScanNet,
     /// Folders of colour and depth images without lists, as Open3D and RealSense recorders write them, or one folder of images.
     Folders,
+    /// A bag of ROS 1, MCAP or rosbag2.
+    Bag,
 }
 
 /// The calibration that a layout brings along.
@@ -67,7 +69,7 @@ pub struct Listing {
 
 impl Layout {
     /// All layouts.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Tum,
         Self::Euroc,
         Self::Kitti,
@@ -79,6 +81,7 @@ impl Layout {
         Self::Replica,
         Self::ScanNet,
         Self::Folders,
+        Self::Bag,
     ];
 
     /// Detects the layout of `folder`; the default is that of TUM.
@@ -100,6 +103,7 @@ impl Layout {
             Self::Replica => "replica",
             Self::ScanNet => "scannet",
             Self::Folders => "folders",
+            Self::Bag => "bag",
         }
     }
 
@@ -117,6 +121,7 @@ impl Layout {
             Self::Replica => "Replica",
             Self::ScanNet => "ScanNet",
             Self::Folders => "folders of images",
+            Self::Bag => "bag",
         }
     }
 
@@ -134,13 +139,14 @@ impl Layout {
             Self::Replica => replica::list(folder, options),
             Self::ScanNet => scannet::list(folder, options),
             Self::Folders => folders::list(folder, options),
+            Self::Bag => bag::list(folder, options),
         }
     }
 
     /// Returns the calibration file that is part of the layout, if it exists.
     pub(super) fn calibration_file(self, folder: &Path) -> Option<PathBuf> {
         let names: &[&str] = match self {
-            Self::Tum | Self::IclNuim | Self::SevenScenes => &[],
+            Self::Tum | Self::IclNuim | Self::SevenScenes | Self::Bag => &[],
             Self::Euroc => &["mav0/cam0/sensor.yaml", "cam0/sensor.yaml"],
             Self::Kitti => &["calib.txt"],
             Self::Eth3d => &[eth3d::CALIBRATION],

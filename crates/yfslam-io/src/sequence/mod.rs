@@ -3,6 +3,7 @@
 //! In: the folder and [`SequenceOptions`]. Out: the frames in order, and a report of what was skipped and why.
 
 mod associate;
+mod bag;
 mod csv;
 mod detect;
 mod eth3d;
@@ -32,6 +33,7 @@ use yfslam::config::DepthSource;
 
 use crate::error::{Error, Result};
 use crate::time::TimeMirror;
+pub use bag::TopicChoice;
 pub use ground_truth::GroundTruthReader;
 pub use image_ref::{ImageRef, ListedImage};
 pub use info::{SequenceInfo, TimeOffset};
@@ -63,6 +65,8 @@ pub struct SequenceOptions {
     pub depth_folder: Option<PathBuf>,
     /// Whether the calibration that is part of a layout is read; a caller with a camera of its own leaves it out.
     pub read_calibration: bool,
+    /// Topics of a bag.
+    pub topics: TopicChoice,
 }
 
 /// Rates that a camera can have, frames per second.
@@ -85,6 +89,7 @@ impl Default for SequenceOptions {
             color_folder: None,
             depth_folder: None,
             read_calibration: true,
+            topics: TopicChoice::default(),
         }
     }
 }

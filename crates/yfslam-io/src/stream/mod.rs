@@ -16,6 +16,8 @@ use crate::camera::CameraSource;
 use crate::decode::{DecodeError, ImageSize, decode_color, decode_depth_image};
 use crate::depth_resampling::DepthResampling;
 use crate::error::Result;
+use crate::message::wire::Wire;
+use crate::message::{MessageType, decode_color_message, decode_depth_message};
 use crate::rectify::{Remap, StereoRectification};
 use crate::sequence::{FrameEntry, ImageRef, Sequence};
 pub use fault::{FrameError, FrameFault};
@@ -210,7 +212,11 @@ pub fn open_color(
     into: &mut RgbImage,
 ) -> std::result::Result<(), FrameFault> {
     image.read(bytes).map_err(FrameFault::Unreadable)?;
-    decode_color(bytes, expected, into).map_err(|error| image_fault(image, error))
+    let decoded = match kind(image) {
+        Some((kind, wire)) => decode_color_message(kind, wire, bytes, expected, into),
+        None => decode_color(bytes, expected, into),
+    };
+    decoded.map_err(|error| image_fault(image, error))
 }
 
 /// Reads and decodes a depth image, as [`decode_depth_image`] does. `bytes` is a buffer that may be reused.
@@ -225,7 +231,19 @@ pub fn open_depth(
     into: &mut DepthImage,
 ) -> std::result::Result<(), FrameFault> {
     image.read(bytes).map_err(FrameFault::Unreadable)?;
-    decode_depth_image(bytes, expected, depth_factor, into).map_err(|error| image_fault(image, error))
+    let decoded = match kind(image) {
+        Some((kind, wire)) => decode_depth_message(kind, wire, bytes, depth_factor, expected, into),
+        None => decode_depth_image(bytes, expected, depth_factor, into),
+    };
+    decoded.map_err(|error| image_fault(image, error))
+}
+
+/// Returns how the bytes of a message are read; `None` for those of a file.
+fn kind(image: &ImageRef) -> Option<(MessageType, Wire)> {
+    match image {
+        ImageRef::File(_) => None,
+        ImageRef::Message(message) => message.kind(),
+    }
 }
 
 fn image_fault(image: &ImageRef, source: DecodeError) -> FrameFault {

@@ -11,6 +11,7 @@ use yfslam_io::sequence::Layout;
 use yfslam_io::{Fault, load_camera};
 use yfslam_synth::{WorldConfig, default_camera, parse_with_camera};
 
+use super::bag::BagArgs;
 use super::masks::{MaskTally, Masks};
 
 /// Largest difference between the time stamps of a colour and a depth image, ms. Source: the tool of the TUM RGB-D benchmark.
@@ -20,7 +21,7 @@ pub const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Input")]
 pub struct SourceArgs {
-    /// Folder of a recording in any of the layouts of --layout, or a synthetic world such as `synth:walking_xyz?seed=7`.
+    /// Folder of a recording in any of the layouts of --layout, a bag (.bag, .mcap, .db3 or folder), or a synthetic world such as `synth:walking_xyz?seed=7`.
     #[arg(
         value_name = "SEQUENCE",
         help_heading = None,
@@ -71,6 +72,8 @@ pub struct SourceArgs {
     /// Inject a fault from START seconds on for SECONDS; the option can be given several times.
     #[arg(long = "fault", value_name = "KIND@START+SECONDS")]
     pub faults: Vec<Fault>,
+    #[command(flatten)]
+    pub bag: BagArgs,
 }
 
 /// Parses the name of a layout.
@@ -119,6 +122,7 @@ impl SourceArgs {
             end: None,
             reverse: false,
             faults: Vec::new(),
+            bag: BagArgs::default(),
         }
     }
 

@@ -105,6 +105,7 @@ pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequ
         depth_folder: args.depth.clone(),
         // The images are taken as they are: the calibration of the folder does not apply to another camera.
         read_calibration: args.camera.is_none(),
+        topics: args.bag.choice(),
     };
     let sequence = Sequence::open(args.folder(), &options)?;
     let camera = camera(args, &sequence);

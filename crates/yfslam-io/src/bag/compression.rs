@@ -1,0 +1,78 @@
+//! Unpacks chunks and messages, never beyond a given length.
+
+use std::io::{self, Read};
+
+/// Longest chunk or message that is unpacked, bytes; recorders make chunks of a few megabytes.
+pub const MAX_UNPACKED_BYTES: u64 = 512 << 20;
+
+/// First bytes of what Zstandard packs.
+const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
+/// How a chunk is packed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compression {
+    None,
+    Bz2,
+    Lz4,
+    Zstd,
+}
+
+impl Compression {
+    /// Returns the compression of this name; `None` if it is not understood.
+    pub fn of(name: &str) -> Option<Self> {
+        Some(match name {
+            "" | "none" => Self::None,
+            "bz2" => Self::Bz2,
+            "lz4" => Self::Lz4,
+            "zstd" => Self::Zstd,
+            _ => return None,
+        })
+    }
+}
+
+/// Unpacks `packed`, which was `length` bytes long.
+pub fn unpack(compression: Compression, packed: &[u8], length: u64) -> Result<Vec<u8>, String> {
+    if length > MAX_UNPACKED_BYTES {
+        return Err(format!("it claims {length} bytes, more than {MAX_UNPACKED_BYTES} are not unpacked"));
+    }
+    let unpacked = match compression {
+        Compression::None => Ok(packed.to_vec()),
+        Compression::Bz2 => read(bzip2::read::MultiBzDecoder::new(packed), length, packed.len()),
+        Compression::Lz4 => read(lz4_flex::frame::FrameDecoder::new(packed), length, packed.len()),
+        Compression::Zstd => zstd(packed).and_then(|decoder| read(decoder, length, packed.len())),
+    };
+    let unpacked = unpacked.map_err(|error| error.to_string())?;
+    match unpacked.len() as u64 == length {
+        true => Ok(unpacked),
+        false => Err(format!("it has {} bytes instead of {length}", unpacked.len())),
+    }
+}
+
+/// Unpacks a message that was packed on its own, as rosbag2 does; other messages stay as they are.
+pub fn unpack_message(bytes: &mut Vec<u8>) -> Result<(), String> {
+    if bytes.starts_with(&ZSTD_MAGIC) {
+        let decoder = zstd(bytes).map_err(|error| error.to_string())?;
+        let unpacked = read(decoder, MAX_UNPACKED_BYTES, bytes.len()).map_err(|error| error.to_string())?;
+        *bytes = unpacked;
+    }
+    Ok(())
+}
+
+/// Returns whether a message is packed on its own. A message of ROS 2 begins with a zero, and one of ROS 1 of the types that are read with
+/// a number that counts from 0.
+pub fn is_packed(bytes: &[u8]) -> bool {
+    bytes.starts_with(&ZSTD_MAGIC)
+}
+
+fn zstd(packed: &[u8]) -> io::Result<ruzstd::decoding::StreamingDecoder<&[u8], ruzstd::decoding::FrameDecoder>> {
+    ruzstd::decoding::StreamingDecoder::new(packed).map_err(io::Error::other)
+}
+
+fn read(decoder: impl Read, length: u64, packed: usize) -> io::Result<Vec<u8>> {
+    // Memory for what a forged length claims is taken only as the data arrive.
+    let likely = (packed as u64).saturating_mul(16).min(length) as usize;
+    let mut unpacked = Vec::with_capacity(likely);
+    // One byte more shows that there is more than was claimed.
+    decoder.take(length + 1).read_to_end(&mut unpacked)?;
+    Ok(unpacked)
+}
