@@ -61,6 +61,12 @@ fn replica_is_read_with_its_scale_and_its_poses() {
 #[test]
 fn icl_nuim_is_read_with_frame_numbers_and_mirrored_poses() {
     assert_same(5000.0, "ICL-NUIM", true, Shots::write_icl_nuim);
+    // Settings files for this data set have a negative fy.
+    assert_same(5000.0, "ICL-NUIM", true, |shots, folder| {
+        shots.write_icl_nuim(folder);
+        fs::remove_file(folder.join("camera.toml")).unwrap();
+        fs::write(folder.join("camera.yaml"), shots.orb_slam_settings(-1.0)).unwrap();
+    });
 }
 
 #[test]

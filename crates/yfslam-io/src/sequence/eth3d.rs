@@ -5,14 +5,12 @@
 
 use std::path::Path;
 
-use yfslam::RgbImage;
-
+use super::images::color_size;
 use super::intrinsics::{has_camera_file, layout_camera};
 use super::layout::Listing;
 use super::{ImageRef, SequenceOptions, tum};
 use crate::camera::check_camera;
-use crate::error::{Error, Result};
-use crate::stream::open_color;
+use crate::error::Result;
 use crate::text::{content_lines, read_text};
 
 /// Units of depth images per metre.
@@ -39,12 +37,8 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     if options.read_calibration && !has_camera_file(folder) {
         let mut calibration = layout_camera(&folder.join(CALIBRATION), DEPTH_FACTOR, options.fps())?;
         let first = listing.entries.iter().find_map(|entry| entry.color.file().map(|path| folder.join(path)));
-        let (mut bytes, mut image) = (Vec::new(), RgbImage::default());
         let first = ImageRef::File(first.unwrap_or_else(|| folder.to_owned()));
-        open_color(&first, None, &mut bytes, &mut image).map_err(|error| {
-            Error::content(folder, error.to_string(), "unpack the sequence again, or give --camera")
-        })?;
-        let size = [image.width(), image.height()];
+        let size = color_size(&first)?;
         [calibration.camera.camera.width, calibration.camera.camera.height] = size;
         calibration.camera.missing.size = false;
         check_camera(&calibration.camera)?;
