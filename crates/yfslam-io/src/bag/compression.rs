@@ -50,10 +50,24 @@ pub fn unpack(compression: Compression, packed: &[u8], length: u64) -> Result<Ve
 
 /// Unpacks a message that was packed on its own, as rosbag2 does; other messages stay as they are.
 pub fn unpack_message(bytes: &mut Vec<u8>) -> Result<(), String> {
-    if bytes.starts_with(&ZSTD_MAGIC) {
+    if is_packed(bytes) {
         let decoder = zstd(bytes).map_err(|error| error.to_string())?;
         let unpacked = read(decoder, MAX_UNPACKED_BYTES, bytes.len()).map_err(|error| error.to_string())?;
+        if unpacked.len() as u64 > MAX_UNPACKED_BYTES {
+            return Err(format!("it has more than {MAX_UNPACKED_BYTES} bytes"));
+        }
         *bytes = unpacked;
+    }
+    Ok(())
+}
+
+/// Unpacks the first `length` bytes of a message that was packed on its own; other messages stay as they are.
+pub fn unpack_head(bytes: &mut Vec<u8>, length: usize) -> Result<(), String> {
+    if is_packed(bytes) {
+        let decoder = zstd(bytes).map_err(|error| error.to_string())?;
+        let mut head = Vec::new();
+        decoder.take(length as u64).read_to_end(&mut head).map_err(|error| error.to_string())?;
+        *bytes = head;
     }
     Ok(())
 }

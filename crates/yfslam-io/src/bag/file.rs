@@ -9,8 +9,9 @@ use super::compression::{MAX_UNPACKED_BYTES, unpack};
 use super::{mcap, ros1};
 use crate::error::{Error, Result};
 
-/// Chunks that stay unpacked: those of the colour and the depth image, and their neighbours.
-const CACHED_CHUNKS: usize = 4;
+/// Most chunks that stay unpacked, and most bytes of them, but for the latest: enough for the look-ahead of the colour and the depth images.
+const CACHED_CHUNKS: usize = 32;
+const CACHED_BYTES: u64 = 64 << 20;
 
 /// Where a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,7 +134,7 @@ impl BagFile {
             Some(Ok(bytes)) => bytes.len() as u64,
             _ => 0,
         };
-        while cache.len() >= CACHED_CHUNKS || cache.iter().map(bytes).sum::<u64>() > MAX_UNPACKED_BYTES {
+        while cache.len() >= CACHED_CHUNKS || cache.iter().map(bytes).sum::<u64>() > CACHED_BYTES {
             cache.remove(0);
         }
         cache.push(entry.clone());

@@ -5,7 +5,7 @@
 use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 
-use super::compression::{Compression, MAX_UNPACKED_BYTES, is_packed, unpack, unpack_message};
+use super::compression::{Compression, MAX_UNPACKED_BYTES, is_packed, unpack, unpack_head, unpack_message};
 use super::file::{BagFile, Format, Position};
 use super::topics::Topics;
 use super::{mcap, ros1};
@@ -238,7 +238,11 @@ impl<'a> Walk<'a> {
         } else if need == Need::Head {
             records.skip(length - head)?;
         }
-        if let Err(problem) = unpack_message(&mut bytes) {
+        let unpacked = match need {
+            Need::Head => unpack_head(&mut bytes, HEAD_BYTES),
+            _ => unpack_message(&mut bytes),
+        };
+        if let Err(problem) = unpacked {
             self.note(format!("a message at byte {} is damaged ({problem}) and left out", position.offset));
             return Ok(());
         }
