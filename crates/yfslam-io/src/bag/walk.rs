@@ -8,11 +8,11 @@ use std::ops::ControlFlow;
 use super::compression::{Compression, MAX_UNPACKED_BYTES, is_packed, unpack, unpack_head, unpack_message};
 use super::file::{BagFile, Format, Position};
 use super::topics::Topics;
-use super::{mcap, ros1};
+use super::{db3, mcap, ros1};
 use crate::error::{Error, Result};
 
 /// Bytes of a message that [`Need::Head`] gives: a header with long names, and what follows up to the encoding.
-const HEAD_BYTES: usize = 512;
+pub const HEAD_BYTES: usize = 512;
 
 /// Most notes that are kept of one file.
 const MAX_NOTES: usize = 20;
@@ -135,6 +135,12 @@ impl<'a> Walk<'a> {
     /// Reads the topics and counts from the summary; returns whether the file has one that is complete.
     pub fn summary(&mut self, file: &BagFile) -> Result<bool> {
         let start = match file.format {
+            // The table of messages is its own index; counting them reads none of their pages.
+            Format::Db3 => {
+                self.counts = true;
+                self.note_log(file);
+                return Ok(matches!(db3::walk(self, file), Ok(())));
+            }
             Format::Ros1 => ros1::summary_start(file)?,
             Format::Mcap => mcap::summary_start(file)?,
         };
@@ -165,6 +171,9 @@ impl<'a> Walk<'a> {
 
     /// Goes through the records from a byte to the end of the file.
     fn range(&mut self, file: &BagFile, start: u64) -> Result<std::result::Result<(), Stop>> {
+        if file.format == Format::Db3 {
+            return Ok(db3::walk(self, file));
+        }
         let failed = |source| Error::read(file.path(), source);
         let mut reader = BufReader::with_capacity(4096, file.reopen()?);
         reader.seek(SeekFrom::Start(start)).map_err(failed)?;
@@ -173,6 +182,7 @@ impl<'a> Walk<'a> {
         Ok(match file.format {
             Format::Ros1 => ros1::walk(self, &mut records),
             Format::Mcap => mcap::walk(self, &mut records),
+            Format::Db3 => Ok(()),
         })
     }
 
@@ -216,12 +226,8 @@ impl<'a> Walk<'a> {
         if length > records.left() {
             return Err(Stop::Truncated(records.at));
         }
-        if self.counts {
-            self.topics.count(self.file, connection, 1);
-            self.widen_span(time_ns, time_ns);
-        }
-        let Some(topic) = self.topics.of(self.file, connection) else { return records.skip(length) };
-        let need = self.needs.get(topic).copied().unwrap_or_default();
+        self.count(connection, time_ns);
+        let Some((topic, need)) = self.need(connection) else { return records.skip(length) };
         let Some(bounded) = u32::try_from(length).ok().filter(|&length| u64::from(length) <= MAX_UNPACKED_BYTES) else {
             self.note(format!("a message of {length} bytes is left out"));
             return records.skip(length);
@@ -229,15 +235,41 @@ impl<'a> Walk<'a> {
         let position = Position { file: self.file, length: bounded, chunk: records.chunk, offset: records.at };
         let head = (HEAD_BYTES as u64).min(length);
         let mut bytes = match need {
-            Need::Skip => return records.skip(length),
             Need::Head => records.take(head)?.to_vec(),
-            Need::Whole => records.take(length)?.to_vec(),
+            _ => records.take(length)?.to_vec(),
         };
         if need == Need::Head && is_packed(&bytes) {
             bytes.extend(records.take(length - head)?);
         } else if need == Need::Head {
             records.skip(length - head)?;
         }
+        self.deliver(topic, need, time_ns, position, bytes)
+    }
+
+    /// Counts a message if messages are counted.
+    pub fn count(&mut self, connection: u32, time_ns: i64) {
+        if self.counts {
+            self.topics.count(self.file, connection, 1);
+            self.widen_span(time_ns, time_ns);
+        }
+    }
+
+    /// Returns the topic of a connection and what is needed of its messages; `None` if nothing is.
+    pub fn need(&self, connection: u32) -> Option<(usize, Need)> {
+        let topic = self.topics.of(self.file, connection)?;
+        let need = self.needs.get(topic).copied().filter(|need| *need != Need::Skip)?;
+        Some((topic, need))
+    }
+
+    /// Unpacks a message and hands it to the visitor.
+    pub fn deliver(
+        &mut self,
+        topic: usize,
+        need: Need,
+        time_ns: i64,
+        position: Position,
+        mut bytes: Vec<u8>,
+    ) -> std::result::Result<(), Stop> {
         let unpacked = match need {
             Need::Head => unpack_head(&mut bytes, HEAD_BYTES),
             _ => unpack_message(&mut bytes),
@@ -249,6 +281,20 @@ impl<'a> Walk<'a> {
         match (self.visit)(Found { topic, received_ns: time_ns, position, bytes: &bytes }) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Stop::Done),
+        }
+    }
+
+    /// Notes that a recorder has left messages outside the file.
+    fn note_log(&mut self, file: &BagFile) {
+        let mut log = file.path().as_os_str().to_owned();
+        log.push("-wal");
+        if std::fs::metadata(&log).is_ok_and(|log| log.len() > 0) {
+            let path = file.path().display();
+            self.note(format!(
+                "the last messages of {path} are in the file {} beside it and are not read; `sqlite3 {path} 'PRAGMA wal_checkpoint'` moves \
+                 them",
+                std::path::Path::new(&log).display()
+            ));
         }
     }
 
