@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! folder ──Sequence──► entries ──FrameStream──► Frame, or a FrameError for a frame that cannot be used
-//!   TUM, EuRoC, KITTI              decoded, stereo pairs rectified
+//!   TUM, EuRoC, ScanNet, …         decoded, stereo pairs rectified
 //! preset, settings file or TOML ──load_camera──► Camera
 //! frames ──FaultInjector──► frames as a faulty camera sends them ──RecordingWriter──► folder, with its BoxList
 //! trajectory file ◄──► TrajectoryFile        points, images, text ──write_atomically──► files

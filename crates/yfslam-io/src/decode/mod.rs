@@ -222,4 +222,6 @@ pub(crate) fn check_size(found: ImageSize, expected: Option<ImageSize>, cure: &'
 }
 
 #[cfg(test)]
+mod format_tests;
+#[cfg(test)]
 mod tests;

@@ -18,7 +18,7 @@ const MAX_NUMBER_DIGITS: usize = 9;
 /// An image file and what its name holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NamedImage {
-    /// The file, in the folder that was given.
+    /// The file, an absolute path.
     pub path: PathBuf,
     /// The last number in its name, such as 12 in `frame-000012.color.png`.
     pub number: Option<u64>,
@@ -36,10 +36,12 @@ pub fn is_image(path: &Path) -> bool {
 /// The folder cannot be read.
 pub fn images_in(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<NamedImage>> {
     let entries = std::fs::read_dir(folder).map_err(|source| Error::read(folder, source))?;
+    // The folder need not be inside that of the sequence, to which relative paths would belong.
+    let folder = std::path::absolute(folder).map_err(|source| Error::read(folder, source))?;
     let named = |path: &Path| path.file_name().is_some_and(|name| wanted(&name.to_string_lossy()));
     let mut images: Vec<NamedImage> = entries
         .flatten()
-        .map(|entry| entry.path())
+        .map(|entry| folder.join(entry.file_name()))
         .filter(|path| is_image(path) && named(path) && path.is_file())
         .map(|path| NamedImage { number: number(&stem(&path)), path })
         .collect();

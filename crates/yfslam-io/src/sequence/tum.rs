@@ -131,8 +131,8 @@ fn no_lists(folder: &Path, wanted: &[&str]) -> Error {
         return Error::content(
             folder,
             "is a file, not a folder",
-            "name the folder that holds the images; unpack an archive, and take a video apart with `ffmpeg -i VIDEO frames/%06d.png`, then run \
-             the folder with --sensor mono and --fps",
+            "unpack an archive and name the folder that holds the images; take a video apart with `ffmpeg -i VIDEO frames/%06d.png` and \
+             run that folder with --sensor mono and --fps",
         );
     }
     let entries = match std::fs::read_dir(folder) {

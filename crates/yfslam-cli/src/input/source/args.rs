@@ -22,7 +22,13 @@ pub const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
 #[command(next_help_heading = "Input")]
 pub struct SourceArgs {
     /// Folder of a recording in any of the layouts of --layout, a bag (.bag, .mcap, .db3 or folder), or a synthetic world such as `synth:walking_xyz?seed=7`.
-    #[arg(value_name = "SEQUENCE", help_heading = None)]
+    #[arg(
+        value_name = "SEQUENCE",
+        help_heading = None,
+        required_unless_present = "color",
+        default_value = "",
+        hide_default_value = true
+    )]
     pub sequence: String,
     /// Layout of the folder [default: detected; `yfslam info SEQUENCE` explains it].
     #[arg(long, value_name = "NAME", value_parser = layout_parser())]
@@ -178,7 +184,10 @@ impl SourceArgs {
         yfslam_synth::is_spec(&self.sequence)
     }
 
+    /// Returns the folder of the sequence: the one that the user named, else that in which the folder of colour images is.
     pub fn folder(&self) -> &Path {
-        Path::new(&self.sequence)
+        let parent = self.color.as_deref().and_then(Path::parent).filter(|_| self.sequence.is_empty());
+        let parent = parent.map(|parent| if parent.as_os_str().is_empty() { Path::new(".") } else { parent });
+        parent.unwrap_or(Path::new(&self.sequence))
     }
 }

@@ -115,8 +115,7 @@ pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequ
 /// Names the camera of the folder that --camera replaces.
 fn replaced_camera(args: &SourceArgs, sequence: &Sequence) -> Option<String> {
     let given = args.camera.as_ref()?;
-    let own =
-        ["camera.toml", "camera.yaml", "camera.yml", "camera_intrinsic.json", "intrinsic.json", "calibration.txt"];
+    let own = ["camera.toml", "camera.yaml", "camera.yml"];
     let own = own.iter().map(|name| args.folder().join(name)).find(|path| path.is_file());
     let own = own.or_else(|| sequence.unread_calibration.clone())?;
     let is_same = Path::new(given).canonicalize().ok().is_some_and(|given| own.canonicalize().ok() == Some(given));
