@@ -10,6 +10,7 @@ use common::bags::{
     CDR, CDR_BIG, COLOR, DEPTH, Form, INFO, Message, NONE, Packing, ROS1, camera_info, mcap_bag, ros1_bag,
 };
 use common::png;
+use common::sqlite::db3_bag;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use yfslam::Frame;
@@ -172,6 +173,12 @@ fn every_container_and_compression_gives_the_frames_that_a_folder_gives() {
         }
     }
     assert_frames(&read("a.mcap", &mcap_bag(&plain(CDR), CDR, NONE, 0, true), &options()).unwrap().1, 0);
+    let packed: Vec<Message> = plain(CDR).into_iter().map(|m| Message { bytes: zstd(&m.bytes), ..m }).collect();
+    for messages in [plain(CDR), packed] {
+        let (sequence, frames) = read("a.db3", &db3_bag(&messages), &options()).unwrap();
+        assert_eq!(frames.len(), 7, "{:?}", sequence.notes);
+        assert_frames(&frames, 0);
+    }
 }
 
 #[test]
@@ -454,6 +461,7 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("a.mcap", mcap_bag(&new, CDR, NONE, 3, true)),
         ("a.mcap", mcap_bag(&new, CDR, ZSTD, 3, true)),
         ("a.mcap", mcap_bag(&new, CDR, NONE, 0, false)),
+        ("a.db3", db3_bag(&new)),
     ]
 }
 
@@ -461,7 +469,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
     #[test]
     fn damaged_bags_never_panic_or_hang(
-        which in 0..6usize,
+        which in 0..7usize,
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
         small in any::<prop::sample::Index>(),
         cut in prop::option::of(any::<prop::sample::Index>()),

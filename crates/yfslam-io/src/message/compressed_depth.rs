@@ -102,7 +102,7 @@ impl Numbers<'_> {
         for shift in (0..33).step_by(3) {
             let in_word = self.next % 8;
             let byte = *self.nibbles.get(self.next / 8 * 4 + 3 - in_word / 2)?;
-            let nibble = if in_word % 2 == 0 { byte >> 4 } else { byte & 15 };
+            let nibble = if in_word.is_multiple_of(2) { byte >> 4 } else { byte & 15 };
             self.next += 1;
             number |= usize::from(nibble & 7) << shift;
             if nibble < 8 {

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
 pub mod bags;
+pub mod sqlite;
 
 use std::fs;
 use std::path::{Path, PathBuf};
