@@ -10,8 +10,8 @@ use super::{db3, mcap, ros1, sqlite};
 use crate::error::{Error, Result};
 
 /// Most chunks that stay unpacked, and most bytes of them, but for the latest: enough for the look-ahead of the colour and the depth images.
-const CACHED_CHUNKS: usize = 32;
-const CACHED_BYTES: u64 = 64 << 20;
+const CACHED_CHUNKS: usize = 16;
+const CACHED_BYTES: u64 = 24 << 20;
 
 /// Where a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

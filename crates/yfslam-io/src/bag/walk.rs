@@ -2,10 +2,11 @@
 //!
 //! In: a file, and which topics are needed. Out: calls of a visitor; notes about what is damaged.
 
-use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 
-use super::compression::{Compression, MAX_UNPACKED_BYTES, is_packed, unpack, unpack_head, unpack_message};
+use super::compression::{Compression, MAX_UNPACKED_BYTES, is_packed, too_long, unpack_head, unpack_message, unpacker};
 use super::file::{BagFile, Format, Position};
 use super::topics::Topics;
 use super::{db3, mcap, ros1};
@@ -13,6 +14,9 @@ use crate::error::{Error, Result};
 
 /// Bytes of a message that [`Need::Head`] gives: a header with long names, and what follows up to the encoding.
 pub const HEAD_BYTES: usize = 512;
+
+/// Bytes that are read at once.
+const READ_AT_ONCE: usize = 4 << 20;
 
 /// Most notes that are kept of one file.
 const MAX_NOTES: usize = 20;
@@ -81,7 +85,34 @@ impl From<std::io::Error> for Stop {
     }
 }
 
-impl<R: Read + Seek> Records<R> {
+/// What records are read from.
+pub trait Source {
+    fn read_exact(&mut self, into: &mut [u8]) -> io::Result<()>;
+    fn skip(&mut self, length: u64) -> io::Result<()>;
+}
+
+impl Source for BufReader<File> {
+    fn read_exact(&mut self, into: &mut [u8]) -> io::Result<()> {
+        Read::read_exact(self, into)
+    }
+
+    fn skip(&mut self, length: u64) -> io::Result<()> {
+        self.seek_relative(i64::try_from(length).map_err(io::Error::other)?)
+    }
+}
+
+/// A chunk that is unpacked while it is read.
+impl Source for Box<dyn Read + '_> {
+    fn read_exact(&mut self, into: &mut [u8]) -> io::Result<()> {
+        Read::read_exact(self, into)
+    }
+
+    fn skip(&mut self, length: u64) -> io::Result<()> {
+        io::copy(&mut self.take(length), &mut io::sink()).map(|_| ())
+    }
+}
+
+impl<R: Source> Records<R> {
     pub fn left(&self) -> u64 {
         self.end.saturating_sub(self.at)
     }
@@ -91,8 +122,13 @@ impl<R: Read + Seek> Records<R> {
         if length > self.left() || length > MAX_UNPACKED_BYTES {
             return Err(Stop::Truncated(self.at));
         }
-        self.buffer.resize(length as usize, 0);
-        self.reader.read_exact(&mut self.buffer)?;
+        self.buffer.clear();
+        while (self.buffer.len() as u64) < length {
+            // Memory for what a forged length claims is taken only as the data arrive.
+            let before = self.buffer.len();
+            self.buffer.resize((before + READ_AT_ONCE).min(length as usize), 0);
+            self.reader.read_exact(self.buffer.get_mut(before..).unwrap_or_default())?;
+        }
         self.at += length;
         Ok(&self.buffer)
     }
@@ -101,7 +137,10 @@ impl<R: Read + Seek> Records<R> {
         if length > self.left() {
             return Err(Stop::Truncated(self.at));
         }
-        self.reader.seek_relative(i64::try_from(length).map_err(|_| Stop::Truncated(self.at))?)?;
+        // The rest of a packed chunk need not be unpacked.
+        if self.chunk == Position::NO_CHUNK || length < self.left() {
+            self.reader.skip(length)?;
+        }
         self.at += length;
         Ok(())
     }
@@ -187,24 +226,32 @@ impl<'a> Walk<'a> {
     }
 
     /// Goes through a chunk that begins at byte `begin`, and whose packed records come next.
-    pub fn chunk<R: Read + Seek>(
+    pub fn chunk<R: Source>(
         &mut self,
         records: &mut Records<R>,
         begin: u64,
         head: ChunkHead,
-        walk: impl FnOnce(&mut Self, &mut Records<Cursor<Vec<u8>>>) -> std::result::Result<(), Stop>,
+        walk: impl FnOnce(&mut Self, &mut Records<Box<dyn Read + '_>>) -> std::result::Result<(), Stop>,
     ) -> std::result::Result<(), Stop> {
         let packed = records.take(head.packed_length)?;
-        let unpacked = match unpack(head.compression, packed, head.unpacked_length) {
-            Ok(unpacked) => unpacked,
-            Err(problem) => {
+        let end = head.unpacked_length;
+        let reader = match unpacker(head.compression, packed) {
+            Ok(reader) if end <= MAX_UNPACKED_BYTES => reader,
+            problem => {
+                let problem = problem.map_or_else(|error| error.to_string(), |_| too_long(end));
                 self.note(format!("the chunk at byte {begin} is damaged ({problem}); its messages are left out"));
                 return Ok(());
             }
         };
-        let end = unpacked.len() as u64;
-        let mut inner = Records { reader: Cursor::new(unpacked), at: 0, end, chunk: begin, buffer: Vec::new() };
+        let mut inner = Records { reader, at: 0, end, chunk: begin, buffer: Vec::new() };
         match walk(self, &mut inner) {
+            Err(Stop::Failed(error)) => {
+                let at = inner.at;
+                self.note(format!(
+                    "the chunk at byte {begin} is damaged from its byte {at} on ({error}); its other messages are used"
+                ));
+                Ok(())
+            }
             Err(Stop::Truncated(at) | Stop::Damaged(at)) => {
                 self.note(format!(
                     "the chunk at byte {begin} is damaged from its byte {at} on; its other messages are used"
@@ -216,7 +263,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Takes a message of `length` bytes that comes next; `time_ns` is when it was received.
-    pub fn message<R: Read + Seek>(
+    pub fn message<R: Source>(
         &mut self,
         records: &mut Records<R>,
         connection: u32,
