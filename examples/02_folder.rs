@@ -13,16 +13,19 @@ use yfslam::{Config, Slam};
 use yfslam_detect::{DetectorConfig, YoloFastestV2};
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
 use yfslam_io::write::{ListedStamps, RecordingWriter};
-use yfslam_io::{FrameStream, Sequence, SequenceOptions, StampedPose, detect_camera, load_camera, write_trajectory};
+use yfslam_io::{
+    FrameStream, Sequence, SequenceOptions, StampedPose, complete_camera, detect_camera, load_camera, write_trajectory,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().map_or_else(render_recording, |folder| Ok(PathBuf::from(folder)))?;
-    let camera = match arguments.next() {
+    let mut camera = match arguments.next() {
         Some(spec) => load_camera(&spec, Some(&folder))?,
         None => detect_camera(&folder)?,
     };
     let sequence = Sequence::open(&folder, &SequenceOptions::default())?;
+    complete_camera(&mut camera, &sequence)?;
 
     let mut config = Config::default();
     config.depth.source = sequence.depth_source;

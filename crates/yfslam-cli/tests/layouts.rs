@@ -61,6 +61,12 @@ fn replica_is_read_with_its_scale_and_its_poses() {
 #[test]
 fn icl_nuim_is_read_with_frame_numbers_and_mirrored_poses() {
     assert_same(5000.0, "ICL-NUIM", true, Shots::write_icl_nuim);
+    // Settings files for this data set have a negative fy.
+    assert_same(5000.0, "ICL-NUIM", true, |shots, folder| {
+        shots.write_icl_nuim(folder);
+        fs::remove_file(folder.join("camera.toml")).unwrap();
+        fs::write(folder.join("camera.yaml"), shots.orb_slam_settings(-1.0)).unwrap();
+    });
 }
 
 #[test]
@@ -297,7 +303,7 @@ fn the_camera_of_the_user_replaces_that_of_the_folder_and_this_is_said() {
     fs::create_dir(&other).unwrap();
     shots.write_camera(&other);
     fs::write(folder.path().join("seq/camera_intrinsic.json"), "broken").unwrap();
-    fails(folder.path(), &["run", "seq", "--method", "none"], &["camera_intrinsic.json", "intrinsic_matrix"]);
+    fails(folder.path(), &["run", "seq", "--method", "none"], &["camera_intrinsic.json", "broken"]);
     let args = ["run", "seq", "--method", "none", "--camera", "other/camera.toml", "--out", "out"];
     let said = succeeds(folder.path(), &args).stderr;
     assert!(said.contains("--camera other/camera.toml is used; seq/camera_intrinsic.json is not read"), "{said}");

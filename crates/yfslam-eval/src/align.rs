@@ -22,6 +22,10 @@ pub enum AlignmentKind {
     Se3,
     /// Rotation, translation and scale: for monocular estimates. It hides the scale error, so state it beside the result.
     Sim3,
+    /// Rotation and translation that bring the first poses together, as `--align_origin` of `evo`.
+    Origin,
+    /// None: both trajectories are in the same world.
+    None,
 }
 
 impl fmt::Display for AlignmentKind {
@@ -29,6 +33,8 @@ impl fmt::Display for AlignmentKind {
         f.write_str(match self {
             Self::Se3 => "SE(3)",
             Self::Sim3 => "Sim(3)",
+            Self::Origin => "first pose",
+            Self::None => "not aligned",
         })
     }
 }
@@ -42,7 +48,7 @@ pub struct Alignment {
     pub rotation: UnitQuaternion<f64>,
     /// Translation, m.
     pub translation: Vector3<f64>,
-    /// Scale, 1 for [`AlignmentKind::Se3`].
+    /// Scale, 1 except for [`AlignmentKind::Sim3`].
     pub scale: f64,
 }
 
@@ -68,7 +74,7 @@ impl Alignment {
 impl fmt::Display for Alignment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.kind {
-            AlignmentKind::Se3 => write!(f, "{}", self.kind),
+            AlignmentKind::Se3 | AlignmentKind::Origin | AlignmentKind::None => write!(f, "{}", self.kind),
             AlignmentKind::Sim3 => write!(f, "{}, scale s = {:.4}", self.kind, self.scale),
         }
     }
@@ -83,11 +89,26 @@ pub struct Ate {
     pub translation_m: Statistics,
 }
 
-/// Finds the transform that aligns the estimated positions with the reference in the least squares sense.
+/// Finds the transform that aligns the estimated positions with the reference, in the least squares sense for
+/// [`AlignmentKind::Se3`] and [`AlignmentKind::Sim3`].
 ///
 /// # Errors
-/// There are fewer than three matches, or the positions lie on a line or at a point.
+/// There are fewer than three matches, or the positions lie on a line or at a point; without a fit, there are no matches.
 pub fn align(matches: &[Match], kind: AlignmentKind) -> Result<Alignment, EvalError> {
+    let rigid = |pose: Isometry3<f64>| Alignment {
+        kind,
+        rotation: pose.rotation,
+        translation: pose.translation.vector,
+        scale: 1.0,
+    };
+    match (kind, matches.first()) {
+        (AlignmentKind::Se3 | AlignmentKind::Sim3, _) => {}
+        (_, None) => return Err(EvalError::TooFewMatches { found: 0, needed: 1 }),
+        (AlignmentKind::Origin, Some(first)) => {
+            return Ok(rigid(first.reference.t_world_cam * first.estimate.t_world_cam.inverse()));
+        }
+        (AlignmentKind::None, Some(_)) => return Ok(rigid(Isometry3::identity())),
+    }
     if matches.len() < 3 {
         return Err(EvalError::TooFewMatches { found: matches.len(), needed: 3 });
     }

@@ -56,6 +56,10 @@ pub struct Evaluation {
     pub max_diff_ns: u64,
     /// Absolute trajectory error.
     pub ate: Ate,
+    /// Absolute trajectory error after the other alignment by least squares: Sim(3) beside SE(3), SE(3) beside Sim(3); `None` without
+    /// such an alignment.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beside: Option<Ate>,
     /// Relative pose errors, in the order of the options.
     pub rpe: Vec<Rpe>,
     /// Length of the estimated path divided by that of the reference, both through the matched poses and with the scale of the
@@ -63,6 +67,14 @@ pub struct Evaluation {
     pub path_ratio: Option<f64>,
     /// Tracked fraction, if the expected frames are known.
     pub coverage: Option<Coverage>,
+}
+
+impl Evaluation {
+    /// Returns the scale of the Sim(3) alignment: by how much the estimate has to be enlarged to fit the reference.
+    pub fn scale(&self) -> Option<f64> {
+        let both = [Some(&self.ate), self.beside.as_ref()];
+        both.into_iter().flatten().find(|ate| ate.alignment.kind == AlignmentKind::Sim3).map(|ate| ate.alignment.scale)
+    }
 }
 
 /// Associates, aligns and measures; both trajectories are sorted by time.
@@ -82,6 +94,12 @@ pub fn evaluate(
         }
         ExpectedFrames::Count(expected) => Some(Coverage::of_count(matches.len(), *expected)?),
     };
+    let other = match options.alignment {
+        AlignmentKind::Se3 => Some(AlignmentKind::Sim3),
+        AlignmentKind::Sim3 => Some(AlignmentKind::Se3),
+        AlignmentKind::Origin | AlignmentKind::None => None,
+    };
+    let beside = other.and_then(|kind| ate(&matches, kind).ok());
     let ate = ate(&matches, options.alignment)?;
     let scaled = ate.alignment.scaled(&matches);
     Ok(Evaluation {
@@ -90,6 +108,7 @@ pub fn evaluate(
         matches: matches.len(),
         max_diff_ns: options.max_diff_ns,
         ate,
+        beside,
         path_ratio: path_ratio(&scaled),
         rpe: options.rpe.iter().map(|o| rpe(&scaled, o)).collect::<Result<_, _>>()?,
         coverage,

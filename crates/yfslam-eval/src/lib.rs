@@ -12,6 +12,7 @@
 
 mod align;
 mod associate;
+mod calibrate;
 mod coverage;
 mod delta;
 mod error;
@@ -23,6 +24,7 @@ mod statistics;
 
 pub use align::{Alignment, AlignmentKind, Ate, align, ate, horn_matrix};
 pub use associate::{DEFAULT_MAX_DIFF_NS, Match, associate};
+pub use calibrate::{Calibration, calibrate};
 pub use coverage::Coverage;
 pub use delta::Delta;
 pub use error::{EvalError, Trajectory};

@@ -59,8 +59,7 @@ impl DepthStatistics {
                 }
             }
         }
-        // The unit is rounded to 32 bits; the units per metre have few decimals.
-        let units_per_metre = (1e4 / f64::from(unit?)).round() / 1e4;
+        let units_per_metre = units_per_metre(unit?);
         let pixels: u64 = histogram.iter().sum();
         let unmeasured = histogram.first().copied().unwrap_or(0);
         let measured = pixels - unmeasured;
@@ -158,6 +157,13 @@ pub fn check_recording(sequence: &Sequence, camera: &CameraSource) -> Result<Opt
     }
 }
 
+/// Returns the units per metre of a unit that was rounded to 32 bits, whose seventh digit is therefore uncertain.
+fn units_per_metre(metres_per_unit: f32) -> f64 {
+    let units = 1.0 / f64::from(metres_per_unit);
+    let scale = 10f64.powf(5.0 - units.log10().floor());
+    (units * scale).round() / scale
+}
+
 /// Formats a value with two significant digits: 0.0014, 1.4, 71000.
 fn significant(value: f64) -> String {
     let digits = if value > 0.0 { (1.0 - value.log10().floor()).clamp(0.0, 12.0) as usize } else { 1 };
@@ -213,6 +219,13 @@ mod tests {
         // Usual values, close work, and a hall.
         for (raw, factor) in [(1400, 1000.0), (16_700, 5000.0), (500, 1000.0), (7000, 1000.0), (9000, 6553.5)] {
             assert_eq!(warning(raw, factor), None, "{raw} {factor}");
+        }
+    }
+
+    #[test]
+    fn the_units_per_metre_are_those_that_were_given() {
+        for units in [1.0, 100.0, 1000.0, 5000.0, 5208.0, 6553.5, 10_000.0, 0.001, 3999.75] {
+            assert!((units_per_metre((1.0 / units) as f32) / units - 1.0).abs() < 1e-15, "{units}");
         }
     }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! folder ──Sequence──► entries ──FrameStream──► Frame, or a FrameError for a frame that cannot be used
 //!   TUM, EuRoC, ScanNet, …         decoded, stereo pairs rectified
-//! preset, settings file or TOML ──load_camera──► Camera
+//! preset or camera file of any dialect ──load_camera──► Camera ──complete_camera──► with the size of the images
 //! frames ──FaultInjector──► frames as a faulty camera sends them ──RecordingWriter──► folder, with its BoxList
 //! trajectory file ◄──► TrajectoryFile        points, images, text ──write_atomically──► files
 //! ```
@@ -12,11 +12,12 @@
 //! frame; the caller counts it and continues.
 //!
 //! ```no_run
-//! use yfslam_io::{FrameStream, Result, Sequence, SequenceOptions, check_recording, detect_camera, stream};
+//! use yfslam_io::{FrameStream, Result, Sequence, SequenceOptions, check_recording, complete_camera, detect_camera, stream};
 //!
 //! fn play(folder: &std::path::Path) -> Result<()> {
 //!     let sequence = Sequence::open(folder, &SequenceOptions::default())?;
-//!     let camera = detect_camera(folder)?;
+//!     let mut camera = detect_camera(folder)?;
+//!     complete_camera(&mut camera, &sequence)?;
 //!     check_recording(&sequence, &camera)?;
 //!     let mut skipped = 0;
 //!     for frame in FrameStream::open(&sequence, &camera, stream::DEFAULT_LOOK_AHEAD)? {
@@ -33,6 +34,7 @@ mod atomic_file;
 pub mod bag;
 pub mod boxes;
 pub mod camera;
+mod complete;
 pub mod decode;
 pub mod depth;
 mod depth_resampling;
@@ -52,6 +54,7 @@ pub use atomic_file::{prepare_folder, write_atomically};
 pub use bag::Bag;
 pub use boxes::BoxList;
 pub use camera::{CameraSource, detect_camera, load_camera};
+pub use complete::complete_camera;
 pub use depth::{DepthStatistics, check_recording};
 pub use depth_resampling::DepthResampling;
 pub use error::{Error, Result};

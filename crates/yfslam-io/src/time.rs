@@ -21,6 +21,14 @@ const MANTISSA_LIMIT: u128 = 10u128.pow(36);
 /// # Errors
 /// [`StampError`] when the text is not a finite decimal number or too large.
 pub fn parse_stamp_ns(text: &str) -> Result<i64, StampError> {
+    parse_stamp_in(text, 9)
+}
+
+/// Parses a time in a unit of 10^`power` ns, such as 6 for milliseconds, into nanoseconds, exactly, as [`parse_stamp_ns`].
+///
+/// # Errors
+/// As for [`parse_stamp_ns`].
+pub(crate) fn parse_stamp_in(text: &str, power: i64) -> Result<i64, StampError> {
     let (negative, unsigned) = match text.as_bytes() {
         [b'-', rest @ ..] => (true, rest),
         [b'+', rest @ ..] => (false, rest),
@@ -32,7 +40,7 @@ pub fn parse_stamp_ns(text: &str) -> Result<i64, StampError> {
         None => (unsigned, 0),
     };
     let (mantissa, scale) = parse_digits(digits)?;
-    let magnitude = scale_by_power_of_ten(mantissa, scale + exponent + 9).ok_or(StampError::OutOfRange)?;
+    let magnitude = scale_by_power_of_ten(mantissa, scale + exponent + power).ok_or(StampError::OutOfRange)?;
     let magnitude = i64::try_from(magnitude).map_err(|_| StampError::OutOfRange)?;
     Ok(if negative { -magnitude } else { magnitude })
 }

@@ -118,7 +118,11 @@ fn folders_without_a_sequence_are_refused_with_a_cure() {
     fs::write(&archive, "x").unwrap();
     assert!(refusal(&archive).contains("is a file, not a folder; unpack"));
     fs::write(path.join("rgb.txt"), "").unwrap();
-    assert!(refusal(path).contains("holds no depth.txt and no associations.txt"));
+    let text = refusal(path);
+    assert!(
+        text.contains("no list of depth or right images (depth.txt, right.txt)") && text.contains("--sensor mono"),
+        "{text}"
+    );
 }
 
 #[test]

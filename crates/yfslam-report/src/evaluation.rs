@@ -1,13 +1,14 @@
 //! In: an evaluation, or errors. Out: their table.
 
-use yfslam_eval::{AlignmentKind, Evaluation, Rpe, Statistics};
+use yfslam_eval::{AlignmentKind, Ate, Evaluation, Rpe, Statistics};
 
 use crate::table::{Table, TableStyle};
 
 /// Returns the errors as a table, with a line below it on the association and the tracked frames.
 pub fn evaluation_table(evaluation: &Evaluation, style: TableStyle) -> String {
-    let ate = (format!("ATE, {} (m)", evaluation.ate.alignment.kind), evaluation.ate.translation_m);
-    let errors = [ate].into_iter().chain(evaluation.rpe.iter().flat_map(rpe_errors));
+    let row = |ate: &Ate| (format!("ATE, {} (m)", ate.alignment.kind), ate.translation_m);
+    let both = [row(&evaluation.ate)].into_iter().chain(evaluation.beside.iter().map(row));
+    let errors = both.chain(evaluation.rpe.iter().flat_map(rpe_errors));
     errors_table(errors).render(style) + &association(evaluation)
 }
 
@@ -41,6 +42,8 @@ fn association(evaluation: &Evaluation) -> String {
     );
     if evaluation.ate.alignment.kind == AlignmentKind::Sim3 {
         text += &format!("; {}", evaluation.ate.alignment);
+    } else if let Some(scale) = evaluation.scale() {
+        text += &format!("; Sim(3) has the scale s = {scale:.4}");
     }
     if let Some(c) = &evaluation.coverage {
         text += &format!("; tracked {} of {} frames ({:.1} %)", c.tracked, c.expected, 100.0 * c.fraction);

@@ -1,4 +1,4 @@
-//! Reports of evaluated runs: HTML pages with SVG figures, and tables as plain text, Markdown, LaTeX or CSV.
+//! Reports of evaluated runs: HTML pages with SVG figures, figures as files (SVG, PDF), and tables as plain text, Markdown, LaTeX or CSV.
 //!
 //! In: the results of one or more methods, as plain data. Out: text. A page needs no other file and no network.
 //!
@@ -27,5 +27,6 @@ mod table;
 
 pub use content::{DenseMapImages, Frames, MethodReport, ProcessorTime, Report, Snapshot, Stage, Times};
 pub use evaluation::{errors_table, evaluation_table, rpe_errors};
+pub use figures::files::FigureFile;
 pub use html::tables_page::{IMPROVEMENT, ORIGIN, PUBLISHED, TableSection, TablesPage};
 pub use table::{Table, TableStyle};

@@ -29,6 +29,10 @@ pub struct Camera {
     /// Distortion coefficients k1, k2, p1, p2, k3 (OpenCV order), all zero for rectified images.
     #[serde(default)]
     pub distortion: [f64; 5],
+    /// Distortion coefficients k4, k5, k6 of the rational model (OpenCV), the denominator of the radial distortion; all zero for most
+    /// lenses.
+    #[serde(default, skip_serializing_if = "is_polynomial")]
+    pub rational: [f64; 3],
     /// Nominal frames per second.
     #[serde(default = "default_fps")]
     pub fps: f64,
@@ -47,6 +51,11 @@ pub struct Camera {
     /// `None`: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_delay_ms: Option<f64>,
+}
+
+/// Returns whether the denominator of the radial distortion is 1.
+fn is_polynomial(rational: &[f64; 3]) -> bool {
+    *rational == [0.0; 3]
 }
 
 fn default_fps() -> f64 {
@@ -68,6 +77,7 @@ impl Camera {
             cx,
             cy,
             distortion: [0.0; 5],
+            rational: [0.0; 3],
             fps: DEFAULT_FPS,
             bf: DEFAULT_BF,
             readout_ms: None,
@@ -81,6 +91,18 @@ impl Camera {
     pub fn with_distortion(mut self, distortion: [f64; 5]) -> Self {
         self.distortion = distortion;
         self
+    }
+
+    /// Sets the coefficients k4, k5, k6 of the rational model (OpenCV order: k1, k2, p1, p2, k3, k4, k5, k6).
+    #[must_use]
+    pub fn with_rational_distortion(mut self, rational: [f64; 3]) -> Self {
+        self.rational = rational;
+        self
+    }
+
+    /// Returns whether the images have lens distortion.
+    pub fn is_distorted(&self) -> bool {
+        self.distortion != [0.0; 5] || !is_polynomial(&self.rational)
     }
 
     /// Sets the nominal frames per second.
@@ -99,9 +121,9 @@ impl Camera {
 
     /// Distorts normalised image coordinates (x = X/Z, y = Y/Z) and returns the pixel position.
     pub fn distort(&self, x: f64, y: f64) -> [f64; 2] {
-        let [k1, k2, p1, p2, k3] = self.distortion;
+        let [_, _, p1, p2, _] = self.distortion;
         let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let radial = self.radial(r2);
         let xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
         let yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
         [self.fx * xd + self.cx, self.fy * yd + self.cy]
@@ -109,13 +131,13 @@ impl Camera {
 
     /// Returns the normalised coordinates of a pixel position: the inverse of [`Camera::distort`], by fixed-point iteration.
     pub fn undistort(&self, u: f64, v: f64) -> [f64; 2] {
-        let [k1, k2, p1, p2, k3] = self.distortion;
+        let [_, _, p1, p2, _] = self.distortion;
         let (xd, yd) = ((u - self.cx) / self.fx, (v - self.cy) / self.fy);
         let (mut x, mut y) = (xd, yd);
         // 20 iterations reach 1e-9 px for the lenses of the presets; the usual five leave 0.01 px in the image corners.
         for _ in 0..20 {
             let r2 = x * x + y * y;
-            let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+            let radial = self.radial(r2);
             let dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
             let dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
             (x, y) = ((xd - dx) / radial, (yd - dy) / radial);
@@ -123,12 +145,57 @@ impl Camera {
         [x, y]
     }
 
+    /// Returns the factor of the radial distortion at the squared distance `r2` from the principal point, in normalised coordinates.
+    fn radial(&self, r2: f64) -> f64 {
+        let [k1, k2, _, _, k3] = self.distortion;
+        let numerator = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        if is_polynomial(&self.rational) {
+            return numerator;
+        }
+        let [k4, k5, k6] = self.rational;
+        numerator / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    }
+
     /// Returns a pixel position without the lens distortion.
     pub(crate) fn undistort_px(&self, u: f64, v: f64) -> [f64; 2] {
-        if self.distortion == [0.0; 5] {
+        if !self.is_distorted() {
             return [u, v];
         }
         let [x, y] = self.undistort(u, v);
         [self.fx * x + self.cx, self.fy * y + self.cy]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wide-angle colour camera as the Azure Kinect has one; numbers of that order, made up.
+    fn wide() -> Camera {
+        Camera::pinhole(1280, 720, 607.0, 606.8, 638.2, 366.9)
+            .with_distortion([0.5, -2.6, 3e-4, -2e-4, 1.5])
+            .with_rational_distortion([0.38, -2.45, 1.44])
+    }
+
+    #[test]
+    fn the_rational_model_is_inverted_up_to_the_corners() {
+        let camera = wide();
+        for (u, v) in [(0.0, 0.0), (1279.0, 0.0), (0.0, 719.0), (1279.0, 719.0), (640.0, 100.0)] {
+            let [x, y] = camera.undistort(u, v);
+            let [again_u, again_v] = camera.distort(x, y);
+            assert!((again_u - u).hypot(again_v - v) < 1e-6, "{u} {v}: {again_u} {again_v}");
+        }
+    }
+
+    #[test]
+    fn the_rational_model_is_that_of_opencv() {
+        let [u, v] = wide().distort(0.4, -0.3);
+        // The formula of OpenCV's documentation, written out at r² = 0.25.
+        let radial =
+            (1.0 + 0.5 * 0.25 - 2.6 * 0.0625 + 1.5 * 0.015625) / (1.0 + 0.38 * 0.25 - 2.45 * 0.0625 + 1.44 * 0.015625);
+        let x = 0.4 * radial + 2.0 * 3e-4 * (0.4 * -0.3) - 2e-4 * (0.25 + 2.0 * 0.16);
+        let y = -0.3 * radial + 3e-4 * (0.25 + 2.0 * 0.09) + 2.0 * -2e-4 * (0.4 * -0.3);
+        assert!((u - (607.0 * x + 638.2)).abs() < 1e-9 && (v - (606.8 * y + 366.9)).abs() < 1e-9);
+        assert!(wide().is_distorted() && !Camera::pinhole(4, 3, 2.0, 2.0, 1.0, 1.0).is_distorted());
     }
 }

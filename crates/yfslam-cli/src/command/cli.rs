@@ -4,7 +4,9 @@ use std::sync::LazyLock;
 
 use clap::{Parser, Subcommand};
 
-use crate::command::{bench, calibrate, completions, config, demo, detect, eval, evo, info, map, run, synth};
+use crate::command::{
+    bench, calibrate, camera, completions, config, convert, demo, detect, eval, evo, info, map, run, synth,
+};
 use crate::input::detector::describe_embedded;
 use crate::ui::verbosity::Verbosity;
 
@@ -38,11 +40,13 @@ pub enum Command {
     Eval(eval::EvalArgs),
     Ape(evo::ApeArgs),
     Rpe(evo::RpeArgs),
+    Convert(convert::ConvertArgs),
     Demo(demo::DemoArgs),
     Detect(detect::DetectArgs),
     Synth(synth::SynthArgs),
     Bench(bench::BenchArgs),
     Calibrate(Box<calibrate::CalibrateArgs>),
+    Camera(camera::CameraArgs),
     Info(info::InfoArgs),
     Config(config::ConfigArgs),
     Completions(completions::CompletionsArgs),

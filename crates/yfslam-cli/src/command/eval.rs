@@ -3,14 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde::Serialize;
-use yfslam_eval::{Delta, EvalOptions, Evaluation, RpeOptions, Statistics, evaluate, improvement_percent};
+use yfslam_eval::{
+    AlignmentKind, Calibration, Delta, EvalOptions, Evaluation, RpeOptions, StampedPose, Statistics, calibrate,
+    evaluate, improvement_percent,
+};
 use yfslam_report::{Table, TableStyle, evaluation_table};
 
-use crate::input::trajectory::read_poses;
-use crate::run::evaluation::{EvaluationArgs, evaluate_possible};
+use crate::input::trajectory::read_compared;
+use crate::output::plots::write_plots;
+use crate::run::evaluation::{EvaluationArgs, ScaleSource, evaluate_possible, scale_warning};
 use crate::ui::terminal::{Terminal, print};
 
 const HELP: &str = "\
@@ -19,21 +23,25 @@ Examples:
   yfslam eval groundtruth.txt yf.txt --versus none.txt       improvement, equation 3 of the YF-SLAM paper
   yfslam eval groundtruth.txt live.txt --delta 1f --delta 0.5m --json
   yfslam eval groundtruth.txt mono.txt --align sim3
+  yfslam eval poses/00.txt kitti.txt --times sequences/00/times.txt
+  yfslam eval data.csv trajectory.txt --calibrate            lever arm and time offset to the body of the ground truth
 
-File format:
-  TUM: `t tx ty tz qx qy qz qw` in each line, world from camera.
+File formats, recognised by their content, in any combination:
+  TUM     `t tx ty tz qx qy qz qw` in each line, with blanks or commas
+  EuRoC   `nanoseconds,px,py,pz,qw,qx,qy,qz,…`, with commas
+  KITTI   twelve numbers of a matrix in each line, without a time; also sixteen
 
 Other tools:
   The errors equal those of the tools of the TUM RGB-D benchmark and of evo. For --max-difference-ms, the former use 20, the latter 10;
   the ground truth of Bonn needs 20. `yfslam ape` and `yfslam rpe` take the options of evo.";
 
-/// Compute the absolute (ATE) and relative (RPE) error of an estimated trajectory.
+/// Compute the absolute (ATE, also called APE) and relative (RPE) error of an estimated trajectory.
 #[derive(Args, Debug)]
 #[command(after_help = HELP)]
 pub struct EvalArgs {
-    /// Ground truth in TUM format.
+    /// Ground truth in the format of TUM, EuRoC or KITTI.
     groundtruth: PathBuf,
-    /// Estimated trajectory in TUM format.
+    /// Estimated trajectory in one of these formats.
     estimate: PathBuf,
     /// Another estimate; the improvement of the first one over it is printed.
     #[arg(long, value_name = "OTHER")]
@@ -46,6 +54,16 @@ pub struct EvalArgs {
     /// Start an interval at every pose and not only where the last one ended; intervals in seconds always do.
     #[arg(long, help_heading = "Evaluation")]
     all_pairs: bool,
+    /// Times of the poses of files in the format of KITTI, in seconds, one in each line.
+    #[arg(long, value_name = "FILE")]
+    times: Option<PathBuf>,
+    /// Also fit lever arm, time offset and scale between the body of the ground truth and the camera; the error that remains is printed
+    /// apart, because it has more free parameters than the usual one.
+    #[arg(long, help_heading = "Evaluation")]
+    calibrate: bool,
+    /// Write figures of trajectories and errors into this folder, as SVG and PDF.
+    #[arg(long, value_name = "DIR")]
+    plots: Option<PathBuf>,
     /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
@@ -89,6 +107,8 @@ struct Comparison {
     versus: Option<Evaluation>,
     #[serde(skip_serializing_if = "Option::is_none")]
     improvement_percent: Option<Vec<Improvement>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration: Option<Calibration>,
 }
 
 /// Improvement of the estimate over the other one, % (equation 3 of the paper); `null` where it is undefined.
@@ -102,27 +122,90 @@ struct Improvement {
 }
 
 pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
-    let truth = read_poses(&args.groundtruth, terminal)?;
+    let paths: Vec<&Path> =
+        [&args.groundtruth, &args.estimate].into_iter().chain(&args.versus).map(PathBuf::as_path).collect();
+    let files = read_compared(&paths, args.times.as_deref(), terminal)?;
+    let [truth, estimate, others @ ..] = &files[..] else {
+        bail!("give the ground truth and the estimated trajectory")
+    };
+    if let Some(warning) = swapped(&args.groundtruth, &args.estimate) {
+        terminal.warn(&warning);
+    }
     let max_diff_ns = args.evaluation.max_diff_ns()?;
-    let evaluated = |path: &Path| -> Result<Evaluation> {
-        let estimate = read_poses(path, terminal)?;
+    let evaluated = |path: &Path, estimate: &[StampedPose]| -> Result<Evaluation> {
         let options = options(args, max_diff_ns);
         // A requested interval must exist; a default one may be missing.
         let evaluation = if args.delta.is_empty() {
-            evaluate_possible(&truth, &estimate, options)
+            evaluate_possible(truth, estimate, options)
         } else {
-            evaluate(&truth, &estimate, &options)
+            evaluate(truth, estimate, &options)
         };
         evaluation.with_context(|| format!("cannot evaluate {} against {}", path.display(), args.groundtruth.display()))
     };
-    let estimate = evaluated(&args.estimate)?;
-    let versus = args.versus.as_deref().map(evaluated).transpose()?;
-    let improvement_percent = versus.as_ref().map(|versus| improvements(&estimate, versus));
-    let comparison = Comparison { estimate, versus, improvement_percent };
+    let evaluation = evaluated(&args.estimate, estimate)?;
+    if let Some(warning) =
+        scale_warning(&evaluation, ScaleSource::Unknown).filter(|_| evaluation.ate.alignment.kind == AlignmentKind::Se3)
+    {
+        terminal.warn(&warning);
+    }
+    let versus = args.versus.as_deref().zip(others.first()).map(|(path, other)| evaluated(path, other)).transpose()?;
+    if let Some(folder) = &args.plots {
+        let first = Some((args.estimate.as_path(), estimate.as_slice(), &evaluation));
+        let second = args.versus.as_deref().zip(others.first()).zip(versus.as_ref());
+        let second = second.map(|((path, other), versus)| (path, other.as_slice(), versus));
+        let estimates: Vec<_> = first.into_iter().chain(second).collect();
+        let written = write_plots(folder, &args.groundtruth, truth, &estimates)?;
+        terminal.note(&format!("{written} figures written to {}, each as SVG and PDF", folder.display()));
+    }
+    let improvement_percent = versus.as_ref().map(|versus| improvements(&evaluation, versus));
+    let calibration = args.calibrate.then(|| calibrate(truth, estimate, max_diff_ns)).transpose();
+    let calibration = calibration.with_context(|| format!("cannot calibrate {}", args.estimate.display()))?;
+    let comparison = Comparison { estimate: evaluation, versus, improvement_percent, calibration };
     if args.json {
         return print(&(serde_json::to_string_pretty(&comparison)? + "\n"));
     }
-    print(&text(args, &comparison))
+    let calibrated = comparison.calibration.as_ref().map_or_else(String::new, describe_calibration);
+    print(&(text(args, &comparison) + &calibrated))
+}
+
+/// Notices a ground truth in the place of the estimate, by the names of the files.
+fn swapped(truth: &Path, estimate: &Path) -> Option<String> {
+    let is_truth = |path: &Path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphanumeric()).collect();
+        name.contains("groundtruth")
+            || name.contains("ground_truth")
+            || words.contains(&"gt")
+            || words.contains(&"truth")
+    };
+    let is_result = |path: &Path| path.with_file_name("run.json").is_file();
+    (is_truth(estimate) && !is_truth(truth) || is_result(truth) && !is_result(estimate)).then(|| {
+        format!(
+            "{} looks like the ground truth and {} like an estimate; the ground truth is the first argument",
+            estimate.display(),
+            truth.display()
+        )
+    })
+}
+
+/// Describes a calibration, apart from the errors of the trajectory.
+fn describe_calibration(calibration: &Calibration) -> String {
+    let Calibration { lever_arm_m: [x, y, z], lever_arm_sd_m, time_offset_s, scale, translation_m } = calibration;
+    let [sd_x, sd_y, sd_z] = lever_arm_sd_m.map(|sd| format!("{:.1}", sd * 1e3));
+    format!(
+        "\nwith lever arm, time offset and scale fitted (not comparable with the errors above):\n\
+         \x20 body of the ground truth in the camera frame: {:.1} {:.1} {:.1} mm (standard deviations {sd_x} {sd_y} {sd_z} mm)\n\
+         \x20 time to add to the estimate: {:.1} ms; scale: {scale:.4}\n\
+         \x20 remaining error (m): RMSE {:.4}, mean {:.4}, median {:.4}, n {}\n",
+        x * 1e3,
+        y * 1e3,
+        z * 1e3,
+        time_offset_s * 1e3,
+        translation_m.rmse,
+        translation_m.mean,
+        translation_m.median,
+        translation_m.count
+    )
 }
 
 /// Returns which errors to compute.

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use yfslam_eval::{AlignmentKind, Delta, Match, RpeOptions, Statistics, associate, ate, rpe};
 use yfslam_report::{TableStyle, errors_table, rpe_errors};
 
-use crate::input::trajectory::read_poses;
+use crate::input::trajectory::read_compared;
 use crate::ui::terminal::{Terminal, print};
 
 const APE_HELP: &str = "\
@@ -54,7 +54,8 @@ pub struct RpeArgs {
 /// Options of both commands.
 #[derive(Args, Debug)]
 struct CommonArgs {
-    /// Ground truth, then the estimated trajectory, both in TUM format; the word `tum` may come before them.
+    /// Ground truth, then the estimated trajectory, in the format of TUM, EuRoC or KITTI; the word `tum`, `euroc` or `kitti` may come
+    /// before them.
     #[arg(value_name = "FILE", num_args = 2..=3, required = true)]
     files: Vec<PathBuf>,
     /// Align the trajectories by rotation and translation.
@@ -148,8 +149,12 @@ impl CommonArgs {
         );
         let (truth, estimate) = match &self.files[..] {
             [truth, estimate] => (truth, estimate),
-            [format, truth, estimate] if format.as_os_str() == "tum" => (truth, estimate),
-            [format, ..] => bail!("the format {} is not supported; give two files in TUM format", format.display()),
+            [format, truth, estimate] if ["tum", "kitti", "euroc"].iter().any(|known| format.as_os_str() == *known) => {
+                (truth, estimate)
+            }
+            [format, ..] => {
+                bail!("the format {} is not supported; give tum, kitti or euroc, or leave it out", format.display())
+            }
             [] => bail!("give the ground truth and the estimated trajectory"),
         };
         ensure!(
@@ -158,8 +163,9 @@ impl CommonArgs {
             self.t_max_diff
         );
         let max_diff_ns = (self.t_max_diff * 1e9) as u64;
-        let (reference, poses) = (read_poses(truth, terminal)?, read_poses(estimate, terminal)?);
-        let matches = associate(&reference, &poses, max_diff_ns).with_context(|| cannot_evaluate(estimate))?;
+        let files = read_compared(&[truth, estimate], None, terminal)?;
+        let [reference, poses] = &files[..] else { bail!("give the ground truth and the estimated trajectory") };
+        let matches = associate(reference, poses, max_diff_ns).with_context(|| cannot_evaluate(estimate))?;
         Ok((matches, estimate))
     }
 }

@@ -206,11 +206,16 @@ fn describe_camera(text: &mut String, source: &CameraSource) -> Result<()> {
     writeln!(text, "camera        {}", source.origin)?;
     writeln!(text, "              {}×{} px, fx {} fy {} cx {} cy {}", c.width, c.height, c.fx, c.fy, c.cx, c.cy)?;
     let [k1, k2, p1, p2, k3] = c.distortion;
+    let [k4, k5, k6] = c.rational;
+    let rational = if c.rational == [0.0; 3] { String::new() } else { format!(" k4 {k4} k5 {k5} k6 {k6}") };
     writeln!(
         text,
-        "              k1 {k1} k2 {k2} p1 {p1} p2 {p2} k3 {k3}; depth factor {}, bf {}",
+        "              k1 {k1} k2 {k2} p1 {p1} p2 {p2} k3 {k3}{rational}; depth factor {}, bf {}",
         source.depth_factor, c.bf
     )?;
+    for note in &source.notes {
+        writeln!(text, "              {note}")?;
+    }
     Ok(())
 }
 

@@ -2,9 +2,11 @@
 
 pub mod bench;
 pub mod calibrate;
+pub mod camera;
 pub mod cli;
 pub mod completions;
 pub mod config;
+pub mod convert;
 pub mod demo;
 pub mod detect;
 pub mod eval;
@@ -30,6 +32,7 @@ pub fn run(cli: &Cli) -> Result<()> {
         Command::Run(args) => run::run(args, terminal),
         Command::Map(args) => map::run(args, terminal),
         Command::Eval(args) => eval::run(args, terminal),
+        Command::Convert(args) => convert::run(args, terminal),
         Command::Ape(args) => evo::run_ape(args, terminal),
         Command::Rpe(args) => evo::run_rpe(args, terminal),
         Command::Demo(args) => demo::run(args, terminal),
@@ -37,6 +40,7 @@ pub fn run(cli: &Cli) -> Result<()> {
         Command::Bench(args) => bench::run(args, terminal),
         Command::Synth(args) => synth::run(args, terminal),
         Command::Calibrate(args) => calibrate::run(args, terminal),
+        Command::Camera(args) => camera::run(args),
         Command::Info(args) => info::run(args),
         Command::Config(args) => config::run(args),
         Command::Completions(args) => completions::run(args, Cli::command()),

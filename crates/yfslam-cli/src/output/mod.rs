@@ -6,6 +6,7 @@ pub mod detections_file;
 pub mod folder;
 pub mod html;
 mod overlay;
+pub mod plots;
 pub mod processor_time;
 pub mod recorder;
 pub mod report;

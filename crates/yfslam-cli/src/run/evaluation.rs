@@ -10,7 +10,8 @@ pub struct EvaluationArgs {
     /// Largest difference between the time stamps of an estimated and a true pose, ms.
     #[arg(long, value_name = "MS", default_value_t = 20.0, allow_negative_numbers = true, help_heading = "Evaluation")]
     pub max_difference_ms: f64,
-    /// Alignment with the ground truth [default: se3; sim3 for runs with a single camera].
+    /// Alignment with the ground truth; `eval` prints the errors after SE(3) and Sim(3) side by side [default: se3; sim3 for runs with a
+    /// single camera].
     #[arg(long, value_enum, value_name = "KIND", help_heading = "Evaluation")]
     pub align: Option<AlignArg>,
 }
@@ -22,6 +23,10 @@ pub enum AlignArg {
     Se3,
     /// Rotation, translation and scale, for a single camera; it hides an unknown scale and part of its drift.
     Sim3,
+    /// Rotation and translation that bring the first poses together.
+    Origin,
+    /// None: both trajectories are in the same world.
+    None,
 }
 
 impl EvaluationArgs {
@@ -30,6 +35,8 @@ impl EvaluationArgs {
         match self.align {
             Some(AlignArg::Se3) => AlignmentKind::Se3,
             Some(AlignArg::Sim3) => AlignmentKind::Sim3,
+            Some(AlignArg::Origin) => AlignmentKind::Origin,
+            Some(AlignArg::None) => AlignmentKind::None,
             None if scale_is_known => AlignmentKind::Se3,
             None => AlignmentKind::Sim3,
         }
@@ -63,5 +70,93 @@ pub fn evaluate_possible(
             evaluate(truth, estimate, &options)
         }
         result => result,
+    }
+}
+
+/// Deviation of the scale from 1 above which it is reported.
+const MAX_SCALE_ERROR: f64 = 0.1;
+
+/// Matches and size of the error, relative to the path, with which a scale means something.
+const MIN_MATCHES: usize = 20;
+const MAX_ERROR_SHARE: f64 = 0.1;
+
+/// Common depth units per metre.
+const FACTORS: [f64; 9] = [1.0, 100.0, 256.0, 1000.0, 4000.0, 5000.0, 5208.0, 6553.5, 10_000.0];
+
+/// What gave an estimate its scale.
+#[derive(Clone, Copy, Debug)]
+pub enum ScaleSource {
+    /// Depth images with these units per metre.
+    DepthFactor(f64),
+    /// The baseline of a stereo camera, m.
+    Baseline(f64),
+    /// Unknown, of a file.
+    Unknown,
+}
+
+/// Describes a scale that differs from that of the ground truth by more than a tenth, with the likely cause.
+pub fn scale_warning(evaluation: &Evaluation, source: ScaleSource) -> Option<String> {
+    let sim3 = [Some(&evaluation.ate), evaluation.beside.as_ref()].into_iter().flatten();
+    let sim3 = sim3.into_iter().find(|ate| ate.alignment.kind == AlignmentKind::Sim3)?;
+    let scale = sim3.alignment.scale;
+    let errors = [evaluation.ate, evaluation.beside?].map(|ate| ate.translation_m.rmse);
+    let [smaller, larger] =
+        [errors.iter().copied().fold(f64::MAX, f64::min), errors.iter().copied().fold(0.0, f64::max)];
+    // Without the scale the error must be much larger, or the scale is that of noise.
+    let is_certain = evaluation.matches >= MIN_MATCHES && smaller <= larger * (1.0 - MAX_ERROR_SHARE);
+    if !is_certain || (1.0 - MAX_SCALE_ERROR..=1.0 / (1.0 - MAX_SCALE_ERROR)).contains(&scale) {
+        return None;
+    }
+    let lengths =
+        if scale > 1.0 { format!("{scale:.2} times too short") } else { format!("{:.2} times too long", 1.0 / scale) };
+    let cause = match source {
+        ScaleSource::DepthFactor(factor) => {
+            let wanted = factor / scale;
+            let common = FACTORS.into_iter().find(|common| (common / wanted - 1.0).abs() < 0.08);
+            match common.filter(|common| (common / factor - 1.0).abs() > 0.05) {
+                Some(common) => {
+                    format!("the depth factor {factor} is probably wrong: --depth-factor {common} would fit")
+                }
+                None => format!("check the depth factor {factor} (about {wanted:.0} would fit) and the focal length"),
+            }
+        }
+        ScaleSource::Baseline(baseline_m) => {
+            format!("check the baseline {baseline_m:.4} m of the camera ({:.4} m would fit)", baseline_m * scale)
+        }
+        ScaleSource::Unknown => match scale {
+            4.5..=5.5 | 0.18..=0.22 => {
+                "depth images of 5000 units per metre were probably read as millimetres, or the reverse".into()
+            }
+            _ => "for a single camera use --align sim3; else check depth factor, baseline and focal length".into(),
+        },
+    };
+    Some(format!("the scale differs from that of the ground truth: lengths are {lengths}; {cause}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Vector3};
+
+    use super::*;
+
+    #[test]
+    fn a_scale_that_is_wrong_is_reported_with_the_factor_that_fits() {
+        let pose = |k: u32, scale: f64| {
+            let t = f64::from(k) * 0.1;
+            let position = Vector3::new(t.sin(), t.cos(), 0.2 * t) * scale;
+            StampedPose::new(i64::from(k) * 100_000_000, Isometry3::new(position, Vector3::zeros()))
+        };
+        let truth: Vec<StampedPose> = (0..60).map(|k| pose(k, 1.0)).collect();
+        let warning = |scale: f64, source| {
+            let estimate: Vec<StampedPose> = (0..60).map(|k| pose(k, scale)).collect();
+            let options = EvalOptions { rpe: Vec::new(), ..EvalOptions::default() };
+            scale_warning(&evaluate(&truth, &estimate, &options).unwrap(), source)
+        };
+        let text = warning(5.0, ScaleSource::DepthFactor(1000.0)).unwrap();
+        assert!(text.contains("5.00 times too long") && text.contains("--depth-factor 5000 would fit"), "{text}");
+        let text = warning(0.5, ScaleSource::Baseline(0.11)).unwrap();
+        assert!(text.contains("2.00 times too short") && text.contains("0.2200 m would fit"), "{text}");
+        assert!(warning(0.2, ScaleSource::Unknown).unwrap().contains("millimetres"));
+        assert_eq!(warning(1.05, ScaleSource::DepthFactor(5000.0)), None);
     }
 }

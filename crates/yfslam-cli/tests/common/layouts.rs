@@ -177,6 +177,20 @@ impl Shots {
         fs::write(folder.join("sensors.yaml"), text).unwrap();
     }
 
+    /// Returns the camera as settings of ORB-SLAM; `y` is 1 or, if y points up, -1.
+    pub fn orb_slam_settings(&self, y: f64) -> String {
+        let Camera { width, height, fx, fy, cx, cy, bf, .. } = self.camera;
+        let mut text = "%YAML:1.0\n".to_owned();
+        for (key, value) in [("fx", fx), ("fy", y * fy), ("cx", cx), ("cy", cy), ("fps", 30.0), ("bf", bf)] {
+            writeln!(text, "Camera.{key}: {value:?}").unwrap();
+        }
+        for key in ["k1", "k2", "p1", "p2"] {
+            writeln!(text, "Camera.{key}: 0.0").unwrap();
+        }
+        writeln!(text, "Camera.width: {width}\nCamera.height: {height}\nDepthMapFactor: {:?}", self.factor).unwrap();
+        text
+    }
+
     pub fn write_vslam_lab(&self, folder: &Path) {
         self.write_images(folder, |k| format!("rgb_0/{k}.png"), |k| format!("depth_0/{k}.png"));
         let rows = self.lines(|k, shot| format!("{0},rgb_0/{k}.png,{0},depth_0/{k}.png", shot.stamp_ns));
@@ -186,16 +200,7 @@ impl Shots {
             self.lines(|_, shot| format!("{},{}", shot.stamp_ns, tum_pose(&shot.t_world_cam).replace(' ', ",")));
         fs::write(folder.join("groundtruth.csv"), "ts (ns),tx (m),ty (m),tz (m),qx,qy,qz,qw\n".to_owned() + &poses)
             .unwrap();
-        let Camera { width, height, fx, fy, cx, cy, bf, .. } = self.camera;
-        let mut text = "%YAML:1.0\n".to_owned();
-        for (key, value) in [("fx", fx), ("fy", fy), ("cx", cx), ("cy", cy), ("fps", 30.0), ("bf", bf)] {
-            writeln!(text, "Camera.{key}: {value:?}").unwrap();
-        }
-        for (key, value) in [("k1", 0.0), ("k2", 0.0), ("p1", 0.0), ("p2", 0.0)] {
-            writeln!(text, "Camera.{key}: {value:?}").unwrap();
-        }
-        writeln!(text, "Camera.width: {width}\nCamera.height: {height}\nDepthMapFactor: {:?}", self.factor).unwrap();
-        fs::write(folder.join("calibration.yaml"), text).unwrap();
+        fs::write(folder.join("calibration.yaml"), self.orb_slam_settings(1.0)).unwrap();
     }
 }
 

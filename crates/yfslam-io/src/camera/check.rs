@@ -8,6 +8,18 @@ use crate::error::{Error, Result};
 /// Largest side of an image, px.
 const MAX_SIDE: usize = 16_384;
 
+/// Focal lengths relative to the longer side of the image: from a field of view of 157° to one of 1°. Beyond are mistakes in the value.
+const FOCAL_PER_SIDE: std::ops::RangeInclusive<f64> = 0.1..=60.0;
+
+/// Largest ratio of fx and fy, in either direction: that of images whose rows or columns were left out.
+const MAX_ASPECT: f64 = 4.0;
+
+/// Distance of a rectified pair of cameras, m.
+const BASELINE_M: std::ops::RangeInclusive<f64> = 1e-4..=1e3;
+
+/// Frames per second: from one in three hours.
+const FPS: std::ops::RangeInclusive<f64> = 1e-4..=1e5;
+
 /// Longest time that a sensor takes to read its rows, ms: more than any camera for video needs.
 const MAX_READOUT_MS: f64 = 100.0;
 
@@ -22,7 +34,8 @@ const MAX_ROUND_TRIP_PX: f64 = 0.5;
 pub fn check_camera(source: &CameraSource) -> Result<()> {
     let CameraSource { camera, depth_factor, origin, .. } = source;
     let refuse = |problem: String, cure: &str| Err(Error::argument(format!("camera {origin}: {problem}"), cure));
-    for (name, side) in [("width", camera.width), ("height", camera.height)] {
+    let has_size = !source.missing.size;
+    for (name, side) in [("width", camera.width), ("height", camera.height)].into_iter().filter(|_| has_size) {
         if !(1..=MAX_SIDE).contains(&side) {
             return refuse(format!("{name} is {side}"), "give the size of the images in pixels");
         }
@@ -39,6 +52,9 @@ pub fn check_camera(source: &CameraSource) -> Result<()> {
             return refuse(format!("{name} is {value}"), cure);
         }
     }
+    if let Some((problem, cure)) = implausible(camera, has_size) {
+        return refuse(problem, cure);
+    }
     let Camera { readout_ms, depth_readout_ms, depth_delay_ms, .. } = *camera;
     let times =
         [("readout_ms", readout_ms), ("depth_readout_ms", depth_readout_ms), ("depth_delay_ms", depth_delay_ms)];
@@ -48,14 +64,51 @@ pub fn check_camera(source: &CameraSource) -> Result<()> {
             return refuse(format!("{name} is {value}"), cure);
         }
     }
-    let others = [camera.cx, camera.cy].into_iter().chain(camera.distortion);
+    let others = [camera.cx, camera.cy].into_iter().chain(camera.distortion).chain(camera.rational);
     if let Some(value) = others.into_iter().find(|value| !value.is_finite()) {
         return refuse(format!("the principal point or the distortion contains {value}"), "calibrate the camera again");
     }
+    if !has_size {
+        return Ok(());
+    }
     check_distortion(camera).or_else(|(u, v)| {
-        let problem = format!("distortion {:?} folds the image at pixel ({u:.0}, {v:.0})", camera.distortion);
-        refuse(problem, "check the order k1, k2, p1, p2, k3, or set them to 0 for rectified images")
+        let rational = if camera.rational == [0.0; 3] { String::new() } else { format!(" with {:?}", camera.rational) };
+        let problem = format!("distortion {:?}{rational} folds the image at pixel ({u:.0}, {v:.0})", camera.distortion);
+        refuse(problem, "check the order k1, k2, p1, p2, k3, k4, k5, k6, or set them to 0 for rectified images")
     })
+}
+
+/// Returns what no camera of this size has, and what to do.
+fn implausible(camera: &Camera, has_size: bool) -> Option<(String, &'static str)> {
+    let Camera { fx, fy, cx, cy, fps, bf, .. } = *camera;
+    let (width, height) = (camera.width as f64, camera.height as f64);
+    if !(1.0 / MAX_ASPECT..=MAX_ASPECT).contains(&(fx / fy)) {
+        return Some((format!("fx is {fx} and fy is {fy}"), "give both focal lengths in pixels; they hardly differ"));
+    }
+    if !BASELINE_M.contains(&(bf / fx)) {
+        let problem = format!("bf is {bf}: with fx {fx} the baseline is {:e} m", bf / fx);
+        return Some((problem, "give the baseline in m times fx in px, such as 40"));
+    }
+    if !FPS.contains(&fps) {
+        return Some((format!("fps is {fps}"), "give the frames per second, such as 30"));
+    }
+    if !has_size {
+        return None;
+    }
+    let longer = width.max(height);
+    for (name, focal) in [("fx", fx), ("fy", fy)] {
+        if !FOCAL_PER_SIDE.contains(&(focal / longer)) {
+            let problem = format!("{name} is {focal} px for images of {width}×{height} px");
+            return Some((problem, "give the focal length in pixels of these images"));
+        }
+    }
+    for (name, centre, side) in [("cx", cx, width), ("cy", cy, height)] {
+        if centre.is_finite() && !(-side..=2.0 * side).contains(&centre) {
+            let problem = format!("{name} is {centre} px for images of {width}×{height} px");
+            return Some((problem, "give the principal point in pixels; it is near the middle of the image"));
+        }
+    }
+    None
 }
 
 /// Undistorts and distorts the corners and edge centres; returns the first pixel at which this fails.

@@ -1,4 +1,5 @@
 use proptest::prelude::*;
+use yfslam::Camera;
 
 use super::*;
 
@@ -7,7 +8,7 @@ const SETTINGS: &str = "%YAML:1.0\n\n#----\n# Camera\n#----\nCamera.fx: 517.3 # 
     Viewer.PointSize:2\nSystem.File: \"a # b\"\n";
 
 fn settings(text: &str) -> Result<CameraSource> {
-    parse_opencv_settings(text, Path::new("cam.yaml"))
+    parse_camera(text, Path::new("cam.yaml"))
 }
 
 fn refusal(text: &str) -> String {
@@ -42,7 +43,7 @@ fn keys_of_orb_slam3_and_indented_keys_are_read() {
 
 #[test]
 fn a_missing_key_is_named_with_file_and_cure() {
-    for (line, key) in [("Camera.fx: 517.3 # px\n", "Camera.fx"), ("DepthMapFactor: 5000.\n", "DepthMapFactor")] {
+    for (line, key) in [("Camera.fx: 517.3 # px\n", "Camera.fx"), ("Camera.fy:516.5\n", "Camera.fy")] {
         let error = refusal(&SETTINGS.replace(line, ""));
         assert!(
             error.contains("cam.yaml") && error.contains(&format!("the key {key} is missing")) && error.contains("add"),
@@ -58,7 +59,7 @@ fn invalid_numbers_lines_without_colon_and_repeated_keys_are_refused() {
     assert!(refusal(&SETTINGS.replace("517.3", "nan")).contains("Camera.fx is 'nan'"));
     assert!(refusal(&SETTINGS.replace("640", "640.5")).contains("Camera.width is 640.5"));
     assert!(refusal(&SETTINGS.replace("fy:516.5", "fy 516.5")).contains("cam.yaml:7"));
-    assert!(refusal(&format!("{SETTINGS}Camera.fx: 1\n")).contains("on line 6 already"));
+    assert!(refusal(&format!("{SETTINGS}Camera.fx: 1\n")).contains("on line 6 already, with another value"));
     assert!(refusal(&format!("{SETTINGS}Camera.type: KannalaBrandt8\n")).contains("KannalaBrandt8"));
 }
 
@@ -139,10 +140,12 @@ proptest! {
     #[test]
     fn a_check_of_arbitrary_values_never_panics(v in prop::array::uniform12(any::<f64>()), width in 0usize..70_000, height: usize) {
         let distortion = [v[4], v[5], v[6], v[7], v[8]];
+        let rational = [v[11], v[4], v[3]];
         let camera = Camera::pinhole(width, height, v[0], v[1], v[2], v[3])
             .with_distortion(distortion)
+            .with_rational_distortion(rational)
             .with_fps(v[10])
             .with_bf(v[11]);
-        let _ = check_camera(&CameraSource { camera, depth_factor: v[9], origin: "here".into(), unused_keys: vec![] });
+        let _ = check_camera(&CameraSource::new(camera, v[9], "here"));
     }
 }

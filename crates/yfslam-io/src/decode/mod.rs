@@ -2,6 +2,7 @@
 //! decides, not the file name.
 
 mod depth_values;
+mod exif;
 #[cfg(feature = "exr")]
 mod exr;
 mod jpeg;
@@ -87,6 +88,16 @@ pub fn decode_color(bytes: &[u8], expected: Option<ImageSize>, into: &mut RgbIma
         Format::Npy => Err(DecodeError::UnknownFormat("a NumPy array")),
         Format::Other(name) => Err(DecodeError::UnknownFormat(name)),
     }
+}
+
+/// Decodes a photo as a viewer shows it: as [`decode_color`], then turned and mirrored by the orientation that its Exif data state.
+///
+/// # Errors
+/// As for [`decode_color`].
+pub fn decode_photo(bytes: &[u8]) -> Result<RgbImage, DecodeError> {
+    let mut image = RgbImage::default();
+    decode_color(bytes, None, &mut image)?;
+    Ok(exif::upright(bytes, image))
 }
 
 /// Decodes a depth image of 16-bit integers (PNG, PGM, TIFF, NumPy) into `into`, whose buffer is reused. The value 65535, with which

@@ -5,46 +5,44 @@
 
 use std::path::Path;
 
-use yfslam::RgbImage;
-
-use super::intrinsics::{has_camera_file, rgbd_camera};
+use super::images::color_size;
+use super::intrinsics::{has_camera_file, layout_camera};
 use super::layout::Listing;
 use super::{ImageRef, SequenceOptions, tum};
-use crate::error::{Error, Result};
-use crate::stream::open_color;
+use crate::camera::check_camera;
+use crate::error::Result;
 use crate::text::{content_lines, read_text};
+
+/// Units of depth images per metre.
+const DEPTH_FACTOR: f64 = 5000.0;
 
 /// Name of the calibration.
 pub const CALIBRATION: &str = "calibration.txt";
 
 /// Returns whether `folder` is such a sequence.
 pub fn is_sequence(folder: &Path) -> bool {
-    folder.join("rgb.txt").is_file()
-        && read_text(&folder.join(CALIBRATION)).is_ok_and(|text| intrinsics(&text).is_some())
+    folder.join("rgb.txt").is_file() && read_text(&folder.join(CALIBRATION)).is_ok_and(|text| is_calibration(&text))
 }
 
-/// Returns fx, fy, cx, cy.
-fn intrinsics(text: &str) -> Option<[f64; 4]> {
-    let (_, line) = content_lines(text).next()?;
-    let numbers: Vec<f64> = line.split_whitespace().map(str::parse).collect::<std::result::Result<_, _>>().ok()?;
-    numbers.try_into().ok()
+/// Returns whether `text` is one line of four numbers.
+fn is_calibration(text: &str) -> bool {
+    let mut lines = content_lines(text).map(|(_, line)| line.split_whitespace().map(str::parse::<f64>));
+    let first = lines.next().map(|words| words.collect::<std::result::Result<Vec<_>, _>>());
+    matches!(first, Some(Ok(numbers)) if numbers.len() == 4) && lines.next().is_none()
 }
 
 /// Lists the frames of `folder`.
 pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     let mut listing = tum::list(folder, options)?;
     if options.read_calibration && !has_camera_file(folder) {
-        let path = folder.join(CALIBRATION);
-        let intrinsics = intrinsics(&read_text(&path)?)
-            .ok_or_else(|| Error::content(&path, "does not hold four numbers", "write 'fx fy cx cy'"))?;
+        let mut calibration = layout_camera(&folder.join(CALIBRATION), DEPTH_FACTOR, options.fps())?;
         let first = listing.entries.iter().find_map(|entry| entry.color.file().map(|path| folder.join(path)));
-        let (mut bytes, mut image) = (Vec::new(), RgbImage::default());
         let first = ImageRef::File(first.unwrap_or_else(|| folder.to_owned()));
-        open_color(&first, None, &mut bytes, &mut image).map_err(|error| {
-            Error::content(folder, error.to_string(), "unpack the sequence again, or give --camera")
-        })?;
-        let size = [image.width(), image.height()];
-        listing.calibration = Some(rgbd_camera(size, intrinsics, 5000.0, options.fps(), path.display().to_string())?);
+        let size = color_size(&first)?;
+        [calibration.camera.camera.width, calibration.camera.camera.height] = size;
+        calibration.camera.missing.size = false;
+        check_camera(&calibration.camera)?;
+        listing.calibration = Some(calibration);
     }
     Ok(listing)
 }

@@ -5,7 +5,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use yfslam::{DepthImage, RgbImage};
+
+use super::ImageRef;
 use super::lists::ListedFile;
+use crate::decode::{DecodeError, decode_color, decode_depth_image};
 use crate::error::{Error, Result};
 use crate::time::parse_stamp_ns;
 
@@ -47,6 +51,33 @@ pub fn images_in(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<Nam
         .collect();
     images.sort_by(|a, b| (a.number, &a.path).cmp(&(b.number, &b.path)));
     Ok(images)
+}
+
+/// Returns the width and height of a colour image.
+///
+/// # Errors
+/// It cannot be read or decoded.
+pub fn color_size(image: &ImageRef) -> Result<[usize; 2]> {
+    let (mut bytes, mut color) = (Vec::new(), RgbImage::default());
+    image.read(&mut bytes)?;
+    decode_color(&bytes, None, &mut color).map_err(|error| unusable(image, &error))?;
+    Ok([color.width(), color.height()])
+}
+
+/// Returns the width and height of a depth image.
+///
+/// # Errors
+/// It cannot be read or decoded.
+pub fn depth_size(image: &ImageRef) -> Result<[usize; 2]> {
+    let (mut bytes, mut depth) = (Vec::new(), DepthImage::default());
+    image.read(&mut bytes)?;
+    decode_depth_image(&bytes, None, 1.0, &mut depth).map_err(|error| unusable(image, &error))?;
+    Ok([depth.raw.width(), depth.raw.height()])
+}
+
+fn unusable(image: &ImageRef, error: &DecodeError) -> Error {
+    let path = image.file().unwrap_or(Path::new("the first image"));
+    Error::content(path, error.to_string(), "unpack the sequence again, or give --camera")
 }
 
 /// Returns the name without its ending.

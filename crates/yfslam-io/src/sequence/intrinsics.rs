@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
 use yfslam::Camera;
 
 use super::layout::Calibration;
-use crate::camera::{CameraSource, check_camera};
-use crate::error::{Error, Result};
-use crate::text::read_text;
+use crate::camera::{CameraSource, check_camera, load_camera};
+use crate::error::Result;
 
 /// Distance between the projector and the camera of a depth sensor, m: that of a Kinect. It scales the virtual disparity.
 const BASELINE_M: f64 = 0.075;
@@ -36,28 +34,32 @@ pub fn rgbd_camera(
     origin: String,
 ) -> Result<Calibration> {
     let camera = Camera::pinhole(width, height, fx, fy, cx, cy).with_fps(fps).with_bf(BASELINE_M * fx);
-    let camera = CameraSource { camera, depth_factor, origin, unused_keys: Vec::new() };
+    let camera = CameraSource::new(camera, depth_factor, origin);
     check_camera(&camera)?;
     Ok(Calibration { camera, rectification: None, depth_resampling: None })
 }
 
-/// The keys of Open3D's camera files; the matrix is in the order of columns.
-#[derive(Deserialize)]
-struct Open3dKeys {
-    width: usize,
-    height: usize,
-    intrinsic_matrix: [f64; 9],
+/// Reads the camera file of an Open3D recording; depth is in millimetres. `None` if there is none.
+///
+/// # Errors
+/// The file cannot be used.
+pub fn open3d_camera(folder: &Path, fps: f64) -> Result<Option<Calibration>> {
+    let path = OPEN3D_FILES.iter().map(|name| folder.join(name)).find(|path| path.is_file());
+    path.map(|path| layout_camera(&path, 1000.0, fps)).transpose()
 }
 
-/// Reads the camera file of an Open3D recording; depth is in millimetres. `None` if there is none.
-pub fn open3d_camera(folder: &Path, fps: f64) -> Result<Option<Calibration>> {
-    let Some(path) = OPEN3D_FILES.iter().map(|name| folder.join(name)).find(|path| path.is_file()) else {
-        return Ok(None);
-    };
-    let keys: Open3dKeys = serde_json::from_str(&read_text(&path)?).map_err(|error| {
-        let cure = "the keys are width, height and intrinsic_matrix with 9 numbers, column by column";
-        Error::content(&path, error.to_string(), cure)
-    })?;
-    let [fx, _, _, _, fy, _, cx, cy, _] = keys.intrinsic_matrix;
-    rgbd_camera([keys.width, keys.height], [fx, fy, cx, cy], 1000.0, fps, path.display().to_string()).map(Some)
+/// Reads a camera file of a layout whose images have `depth_factor` units per metre unless the file says otherwise.
+///
+/// # Errors
+/// The file cannot be used.
+pub fn layout_camera(path: &Path, depth_factor: f64, fps: f64) -> Result<Calibration> {
+    let mut camera = load_camera(&path.to_string_lossy(), None)?;
+    if camera.missing.depth_factor {
+        camera.set_depth_factor(depth_factor);
+    }
+    if camera.missing.baseline {
+        camera.camera.bf = BASELINE_M * camera.camera.fx;
+    }
+    camera.camera.fps = fps;
+    Ok(Calibration { camera, rectification: None, depth_resampling: None })
 }

@@ -5,40 +5,23 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
 use yfslam::config::DepthSource;
 
 use super::folders::Images;
 use super::images::images_in;
-use super::intrinsics::{has_camera_file, rgbd_camera};
+use super::intrinsics::{has_camera_file, layout_camera, rgbd_camera};
 use super::layout::{Calibration, Listing, rgbd_or_mono};
 use super::{GroundTruthReader, SequenceOptions};
-use crate::error::{Error, Result};
-use crate::text::read_text;
+use crate::error::Result;
 
 /// Name of the camera file.
 pub const CAMERA_FILE: &str = "cam_params.json";
 
-/// The keys of the camera file.
-#[derive(Deserialize)]
-struct CameraFile {
-    camera: CameraKeys,
-}
+/// Size and fx, fy, cx, cy of all published rooms, for folders without the file.
+const CAMERA: ([usize; 2], [f64; 4]) = ([1200, 680], [600.0, 600.0, 599.5, 339.5]);
 
-#[derive(Deserialize)]
-struct CameraKeys {
-    w: usize,
-    h: usize,
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
-    scale: f64,
-}
-
-/// The camera of all rooms, for folders without the file.
-const DOCUMENTED: CameraKeys =
-    CameraKeys { w: 1200, h: 680, fx: 600.0, fy: 600.0, cx: 599.5, cy: 339.5, scale: 6553.5 };
+/// Units of depth images per metre.
+const DEPTH_FACTOR: f64 = 6553.5;
 
 /// Returns whether `folder` is such a sequence.
 pub fn is_sequence(folder: &Path) -> bool {
@@ -74,16 +57,11 @@ fn camera(folder: &Path, fps: f64) -> Result<(Calibration, bool)> {
     let parent = folder.canonicalize().ok().and_then(|folder| folder.parent().map(Path::to_owned));
     let candidates = [Some(folder.to_owned()), parent].into_iter().flatten();
     let path = candidates.map(|folder| folder.join(CAMERA_FILE)).find(|path| path.is_file());
-    let keys = match &path {
-        Some(path) => {
-            let file: CameraFile = serde_json::from_str(&read_text(path)?).map_err(|error| {
-                Error::content(path, error.to_string(), "the keys of `camera` are w, h, fx, fy, cx, cy, scale")
-            })?;
-            file.camera
+    match path {
+        Some(path) => Ok((layout_camera(&path, DEPTH_FACTOR, fps)?, false)),
+        None => {
+            let (size, intrinsics) = CAMERA;
+            Ok((rgbd_camera(size, intrinsics, DEPTH_FACTOR, fps, "Replica, as published".into())?, true))
         }
-        None => DOCUMENTED,
-    };
-    let origin = path.as_ref().map_or("Replica, as published".to_owned(), |path| path.display().to_string());
-    let intrinsics = [keys.fx, keys.fy, keys.cx, keys.cy];
-    Ok((rgbd_camera([keys.w, keys.h], intrinsics, keys.scale, fps, origin)?, path.is_none()))
+    }
 }

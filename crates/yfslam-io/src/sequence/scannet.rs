@@ -6,17 +6,16 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use yfslam::Camera;
 use yfslam::config::DepthSource;
-use yfslam::{Camera, DepthImage, RgbImage};
 
 use super::folders::Images;
-use super::images::images_in;
+use super::images::{color_size, depth_size, images_in};
 use super::intrinsics::{has_camera_file, rgbd_camera};
 use super::layout::{Calibration, Listing, rgbd_or_mono};
 use super::{FrameEntry, GroundTruthReader, SequenceOptions};
 use crate::depth_resampling::DepthResampling;
 use crate::error::{Error, Result};
-use crate::stream::{open_color, open_depth};
 use crate::text::read_text;
 
 /// Units of depth images per metre.
@@ -68,17 +67,8 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
 
 /// Reads the calibration; the sizes are those of the images of `first`.
 fn read_calibration(folder: &Path, first: &FrameEntry, fps: f64) -> Result<Calibration> {
-    let (mut bytes, mut color, mut depth) = (Vec::new(), RgbImage::default(), DepthImage::default());
-    let unusable = |error: crate::stream::FrameFault| {
-        Error::content(folder, error.to_string(), "export the scene again, or give --camera")
-    };
-    open_color(&first.color, None, &mut bytes, &mut color).map_err(unusable)?;
-    let color_size = [color.width(), color.height()];
-    let mut depth_size = color_size;
-    if let Some(paired) = &first.paired_image {
-        open_depth(&paired.image, None, DEPTH_FACTOR, &mut bytes, &mut depth).map_err(unusable)?;
-        depth_size = [depth.raw.width(), depth.raw.height()];
-    }
+    let color_size = color_size(&first.color)?;
+    let depth_size = first.paired_image.as_ref().map_or(Ok(color_size), |paired| depth_size(&paired.image))?;
     let (color_path, color_intrinsics) = fitting(folder, color_size)?;
     let origin = color_path.display().to_string();
     let mut calibration = rgbd_camera(color_size, color_intrinsics, DEPTH_FACTOR, fps, origin)?;

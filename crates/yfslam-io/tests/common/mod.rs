@@ -16,12 +16,7 @@ pub const SIZE: (u32, u32) = (8, 6);
 
 /// Returns the camera of [`write_sequence`].
 pub fn camera() -> CameraSource {
-    CameraSource {
-        camera: Camera::pinhole(SIZE.0 as usize, SIZE.1 as usize, 8.0, 8.0, 4.0, 3.0),
-        depth_factor: 5000.0,
-        origin: "test".into(),
-        unused_keys: Vec::new(),
-    }
+    CameraSource::new(Camera::pinhole(SIZE.0 as usize, SIZE.1 as usize, 8.0, 8.0, 4.0, 3.0), 5000.0, "test")
 }
 
 pub fn png(size: (u32, u32), color: png::ColorType, depth: png::BitDepth, data: &[u8]) -> Vec<u8> {

@@ -38,6 +38,6 @@ pub fn bars(report: &Report, scene: &Scene) -> Option<Captioned> {
     }
     let title = "RMSE and standard deviation of the ATE".to_owned();
     let x = Axis::groups(&["RMSE", "S.D."]);
-    let figure = Figure { description: title.clone(), size: [WIDTH, HEIGHT], x, y, marks };
-    Some(Captioned { svg: figure.svg(), title, note: String::new() })
+    let figure = Figure { description: title.clone(), size: [WIDTH, HEIGHT], x, y, marks, legend: Vec::new() };
+    Some(Captioned { figure, title, note: String::new() })
 }

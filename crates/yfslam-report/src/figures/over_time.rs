@@ -76,8 +76,15 @@ fn figure(scene: &Scene, title: &str, y: Axis, note: String, of: impl Fn(&ErrorA
         marks.extend(method.series.errors.iter().map(line));
     }
     let x = Axis::linear("time (s)", [0.0, scene.clock.end_s().max(1e-3)], 7, 1.0);
-    let figure = Figure { description: format!("{title} over time. {note}"), size: [WIDTH, HEIGHT], x, y, marks };
-    Captioned { svg: figure.svg(), title: title.into(), note }
+    let figure = Figure {
+        description: format!("{title} over time. {note}"),
+        size: [WIDTH, HEIGHT],
+        x,
+        y,
+        marks,
+        legend: Vec::new(),
+    };
+    Captioned { figure, title: title.into(), note }
 }
 
 fn largest(scene: &Scene, of: impl Fn(&ErrorAt) -> f64) -> Option<f64> {

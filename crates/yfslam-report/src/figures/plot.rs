@@ -1,7 +1,8 @@
-//! In: axes and marks in their units. Out: a figure as SVG. Only this file uses the plotting library.
+//! In: axes and marks in their units. Out: a figure as SVG or PDF. Only this file and its PDF backend use the plotting library.
 
 use std::ops::Range;
 
+use plotters::coord::Shift;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -9,6 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::axis::Axis;
 use super::ink::Ink;
 use super::path::{Point, clip, thin};
+use super::pdf::{PdfBackend, PdfContent, text_width};
 
 /// The library rounds positions to whole pixels; figures are drawn this many times larger to avoid visible steps.
 const FINE: f64 = 10.0;
@@ -44,9 +46,26 @@ pub struct Figure {
     pub x: Axis,
     pub y: Axis,
     pub marks: Vec<Mark>,
+    /// Names of the lines, for a figure in a file of its own; the page has its legend beside the figure.
+    pub legend: Vec<(String, Ink)>,
 }
 
-type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
+type Chart<'a, B> = ChartContext<'a, B, Cartesian2d<Axis, Axis>>;
+impl Mark {
+    /// Returns the points that a legend should not cover.
+    fn points(&self) -> Vec<Point> {
+        match self {
+            Self::Line { points, .. } => points.clone(),
+            Self::Dot { at, .. } | Self::Cross { at, .. } => vec![*at],
+            Self::Bar { from, to, height, .. } => {
+                let middle = (from + to) / 2.0;
+                (0..=10).map(|k| [middle, height * f64::from(k) / 10.0]).collect()
+            }
+            Self::Span { .. } => Vec::new(),
+        }
+    }
+}
+
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 /// Returns the size of the plot in a figure of this size, px.
@@ -71,8 +90,31 @@ impl Figure {
         }
     }
 
+    /// Returns the figure as an SVG file, in its size in px; empty if the library cannot draw it.
+    pub fn svg_file(&self) -> String {
+        let [width, height] = self.size.map(fine);
+        let drawn = format!("width=\"{width}\" height=\"{height}\"");
+        self.svg().replacen(&drawn, &format!("width=\"{:.0}\" height=\"{:.0}\"", self.size[0], self.size[1]), 1)
+    }
+
+    /// Returns the figure as a PDF file; empty if the library cannot draw it.
+    pub fn pdf(&self) -> Vec<u8> {
+        let mut content = PdfContent::new(self.size.map(fine), FINE);
+        match self.draw_on(PdfBackend::new(&mut content)) {
+            Ok(()) => content.file(&self.description),
+            Err(_) => Vec::new(),
+        }
+    }
+
     fn draw(&self, svg: &mut String) -> Drawn {
-        let root = SVGBackend::with_string(svg, (fine(self.size[0]), fine(self.size[1]))).into_drawing_area();
+        self.draw_on(SVGBackend::with_string(svg, (fine(self.size[0]), fine(self.size[1]))))
+    }
+
+    fn draw_on<B: DrawingBackend>(&self, backend: B) -> Drawn
+    where
+        B::ErrorType: 'static,
+    {
+        let root = backend.into_drawing_area();
         let mut chart = ChartBuilder::on(&root)
             .margin(fine(MARGIN))
             .x_label_area_size(fine(BELOW))
@@ -83,10 +125,61 @@ impl Figure {
             self.draw_mark(&mut chart, mark)?;
         }
         drop(chart);
+        self.draw_legend(&root)?;
         Ok(root.present()?)
     }
 
-    fn draw_axes(&self, chart: &mut Chart) -> Drawn {
+    /// Draws the names of the lines inside the plot, in the corner with the fewest points.
+    fn draw_legend<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>) -> Drawn
+    where
+        B::ErrorType: 'static,
+    {
+        if self.legend.is_empty() {
+            return Ok(());
+        }
+        let names = self.legend.iter().map(|(name, _)| text_width(name, TEXT));
+        let size = [names.fold(0.0, f64::max) + 34.0, 16.0 * self.legend.len() as f64 + 6.0];
+        let [left, top] = self.quietest_corner(size);
+        let px = |x: f64, y: f64| (fine(left + x) as i32, fine(top + y) as i32);
+        root.draw(&Rectangle::new([px(0.0, 0.0), px(size[0], size[1])], WHITE.mix(0.8).filled()))?;
+        root.draw(&Rectangle::new([px(0.0, 0.0), px(size[0], size[1])], color(Ink::Grid).stroke_width(fine(1.0))))?;
+        for (row, (name, ink)) in self.legend.iter().enumerate() {
+            let y = 16.0 * row as f64 + 11.0;
+            root.draw(&PathElement::new(vec![px(6.0, y), px(24.0, y)], color(*ink).stroke_width(fine(2.0))))?;
+            let place = Pos::new(HPos::Left, VPos::Center);
+            let style = ("sans-serif", fine(TEXT * 1.24)).into_font().color(&color(Ink::Text)).pos(place);
+            root.draw(&Text::new(name.clone(), px(29.0, y), style))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the place of a box of this size in the corner of the plot with the fewest points, px.
+    fn quietest_corner(&self, [width, height]: [f64; 2]) -> [f64; 2] {
+        const GAP: f64 = 6.0;
+        let plot = plot_size(self.size);
+        let (low_x, low_y) = (LEFT + MARGIN + GAP, MARGIN + GAP);
+        let (high_x, high_y) = (LEFT + MARGIN + plot[0] - width - GAP, MARGIN + plot[1] - height - GAP);
+        let points: Vec<Point> = self.marks.iter().flat_map(Mark::points).map(|at| self.px_of(at)).collect();
+        let inside = |[left, top]: [f64; 2]| {
+            let holds = |[x, y]: &&Point| (left..left + width).contains(x) && (top..top + height).contains(y);
+            points.iter().filter(holds).count()
+        };
+        let corners = [[high_x, low_y], [low_x, low_y], [high_x, high_y], [low_x, high_y]];
+        corners.into_iter().min_by_key(|corner| inside(*corner)).unwrap_or([high_x, low_y])
+    }
+
+    /// Returns where a point is in the figure, px.
+    fn px_of(&self, at: Point) -> Point {
+        let [x, y] = self.place(at);
+        let share = |v: f64, [low, high]: [f64; 2]| (v - low) / (high - low).max(f64::MIN_POSITIVE);
+        let plot = plot_size(self.size);
+        [LEFT + MARGIN + share(x, self.x.range) * plot[0], MARGIN + (1.0 - share(y, self.y.range)) * plot[1]]
+    }
+
+    fn draw_axes<B: DrawingBackend>(&self, chart: &mut Chart<'_, B>) -> Drawn
+    where
+        B::ErrorType: 'static,
+    {
         let text = |ink: Ink| ("sans-serif", fine(TEXT * 1.24)).into_font().color(&color(ink));
         let mut mesh = chart.configure_mesh();
         if self.x.name.is_empty() {
@@ -104,7 +197,10 @@ impl Figure {
         Ok(())
     }
 
-    fn draw_mark(&self, chart: &mut Chart, mark: &Mark) -> Drawn {
+    fn draw_mark<B: DrawingBackend>(&self, chart: &mut Chart<'_, B>, mark: &Mark) -> Drawn
+    where
+        B::ErrorType: 'static,
+    {
         let [bottom, top] = self.y.range;
         match mark {
             Mark::Line { points, ink, width, opacity } => {

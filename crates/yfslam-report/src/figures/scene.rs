@@ -2,6 +2,7 @@
 
 use super::ink::Ink;
 use super::orientation::BodyRotation;
+use super::plot::Figure;
 use super::series::{At, Clock, Series};
 use crate::content::Report;
 
@@ -28,7 +29,7 @@ pub struct Drawn<'a> {
 
 /// A figure with title and note.
 pub struct Captioned {
-    pub svg: String,
+    pub figure: Figure,
     pub title: String,
     pub note: String,
 }

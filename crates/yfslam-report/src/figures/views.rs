@@ -55,9 +55,10 @@ fn view(scene: &Scene, title: &str, x: &Direction, y: &Direction) -> Option<Capt
         x: Axis::linear(format!("{} (m)", x.name), around(x_range, plot_width), 6, 1.0),
         y: Axis::linear(format!("{} (m)", y.name), around(y_range, plot_height), (plot_height / 55.0) as usize, 1.0),
         marks: marks(scene, |at| [x.of(at), y.of(at)]),
+        legend: Vec::new(),
     };
     let note = if x_cut || y_cut { "Clipped where an estimate is far from the ground truth." } else { "" };
-    Some(Captioned { svg: figure.svg(), title: title.into(), note: note.into() })
+    Some(Captioned { figure, title: title.into(), note: note.into() })
 }
 
 fn marks(scene: &Scene, flat: impl Fn(&At) -> Point) -> Vec<Mark> {

@@ -219,7 +219,7 @@ fn figure(scene: &Scene, captioned: &Captioned, with_truth: bool) -> Markup {
                     @for method in &scene.methods { (key(method.name, method.ink)) }
                 }
             }
-            (PreEscaped(&captioned.svg))
+            (PreEscaped(captioned.figure.svg()))
             @if !captioned.note.is_empty() { p.note { (captioned.note) } }
         }
     }

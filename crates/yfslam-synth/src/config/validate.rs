@@ -34,6 +34,7 @@ impl WorldConfig {
         check(camera.fy.is_finite() && camera.fy > 1.0, "camera.fy", camera.fy, "greater than 1 px")?;
         check(finite(&[camera.cx, camera.cy]), "camera.cx, camera.cy", camera.cx, "finite")?;
         check(finite(&camera.distortion), "camera.distortion", format!("{:?}", camera.distortion), "finite")?;
+        check(finite(&camera.rational), "camera.rational", format!("{:?}", camera.rational), "finite")?;
         check((1e-3..=1e3).contains(&camera.fps), "camera.fps", camera.fps, "between 0.001 and 1000 Hz")?;
         let factor = self.depth_factor;
         check((1.0..=1e6).contains(&factor), "depth_factor", factor, "between 1 and 1000000 units per metre")?;
@@ -42,7 +43,7 @@ impl WorldConfig {
         if self.stereo_m > 0.0 {
             let distortion = camera.distortion;
             check(
-                distortion == [0.0; 5],
+                !camera.is_distorted(),
                 "camera.distortion",
                 format!("{distortion:?}"),
                 "zero for a stereo camera, whose images are rectified (such as --camera tum3)",

@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
 use crate::dense::{DenseMap, PlacedPatch};
+use crate::map::camera_record::CameraRecord;
 use crate::map::container::{ContainerError, DENSE_MAP, MAP};
-use crate::map::persist::{CameraRecord, pose_of, pose_record};
+use crate::map::persist::{pose_of, pose_record};
 
 #[derive(Serialize, Deserialize)]
 struct Records {
@@ -39,7 +40,7 @@ struct PatchRecord {
 /// # Errors
 /// If it cannot be encoded, which would be a fault of this program.
 pub(super) fn encode(dense_map: &DenseMap) -> Result<Vec<u8>, ContainerError> {
-    DENSE_MAP.pack(&Records {
+    DENSE_MAP.of_camera(dense_map.grid.camera()).pack(&Records {
         camera: CameraRecord::of(dense_map.grid.camera()),
         stride_px: dense_map.grid.stride_px() as u32,
         class_names: dense_map.class_names.clone(),

@@ -10,19 +10,23 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::camera::Camera;
+
 /// A type of section: its first bytes, and the version of the records that this program writes and reads.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Section {
     /// First bytes, such as "yfslam map".
     pub magic: &'static str,
-    /// The only version that is read.
+    /// The version that is written, and read.
     pub version: u16,
+    /// The version of records whose camera has the rational distortion model, which programs of the version before cannot read.
+    pub rational_version: u16,
 }
 
 /// Section with the keyframes and landmarks, for localisation.
-pub(crate) const MAP: Section = Section { magic: "yfslam map", version: 1 };
+pub(crate) const MAP: Section = Section { magic: "yfslam map", version: 1, rational_version: 2 };
 /// Section with the keyframe patches of a dense map.
-pub(crate) const DENSE_MAP: Section = Section { magic: "yfslam dense map", version: 3 };
+pub(crate) const DENSE_MAP: Section = Section { magic: "yfslam dense map", version: 3, rational_version: 4 };
 
 /// Reason why bytes cannot be read as a saved map.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -69,6 +73,12 @@ pub enum ContainerError {
 }
 
 impl Section {
+    /// Returns the type of section that is written for a camera.
+    pub(crate) fn of_camera(self, camera: &Camera) -> Self {
+        let version = if camera.rational == [0.0; 3] { self.version } else { self.rational_version };
+        Self { version, ..self }
+    }
+
     /// Returns the length of the header, bytes.
     pub(crate) const fn header(self) -> usize {
         self.magic.len() + 2 + 8 + 4
@@ -105,7 +115,7 @@ impl Section {
         let header = self.header() as u64;
         let (version, rest) = rest.split_first_chunk::<2>().ok_or_else(|| wrong_length(header))?;
         let found = u16::from_le_bytes(*version);
-        if found != self.version {
+        if ![self.version, self.rational_version].contains(&found) {
             return Err(ContainerError::Version { magic: self.magic, found, version: self.version });
         }
         let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(|| wrong_length(header))?;

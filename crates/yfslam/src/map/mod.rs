@@ -12,6 +12,8 @@
 //! 6. Loop edges are mutual; a keyframe with a loop edge is never removed.
 
 #[cfg(feature = "persist")]
+pub(crate) mod camera_record;
+#[cfg(feature = "persist")]
 pub(crate) mod container;
 mod keyframe;
 mod landmark;

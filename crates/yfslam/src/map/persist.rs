@@ -11,6 +11,7 @@ use crate::camera::Camera;
 use crate::config::{Config, FeatureConfig};
 use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds, OrbExtractor};
 use crate::geometry::Pose;
+use crate::map::camera_record::CameraRecord;
 use crate::map::container::{DENSE_MAP, MAP};
 use crate::map::{KeyFrameId, LandmarkId, Map};
 
@@ -35,21 +36,6 @@ struct Records {
     keyframes_ever: u64,
     keyframes: Vec<KeyFrameRecord>,
     landmarks: Vec<LandmarkRecord>,
-}
-
-/// Written in the place of the depth factor: files are then the same as those of earlier programs for cameras like those of TUM.
-const RESERVED: f64 = 5000.0;
-
-/// A camera in a format without field names, in which no field is optional.
-#[derive(Serialize, Deserialize)]
-pub(crate) struct CameraRecord {
-    size: [u32; 2],
-    intrinsics: [f64; 4],
-    distortion: [f64; 5],
-    /// The depth factor in files of earlier programs; the depth unit now belongs to the depth images.
-    reserved: f64,
-    fps: f64,
-    bf: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -91,7 +77,7 @@ struct LandmarkRecord {
 /// # Errors
 /// If serialisation fails, which would be a fault of this program.
 pub(crate) fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Result<Vec<u8>, MapError> {
-    MAP.pack(&Records::of(map, camera, features))
+    MAP.of_camera(camera).pack(&Records::of(map, camera, features))
 }
 
 /// Reads and checks a map. The section of a dense map before it is verified and skipped.
@@ -247,29 +233,6 @@ impl FeatureRecord {
         let [u, v] = self.undistorted;
         let Self { raw, octave, angle_rad, depth_m, trust, .. } = *self;
         (Feature { raw, u, v, octave, angle_rad, depth_m, trust }, Descriptor(words))
-    }
-}
-
-impl CameraRecord {
-    pub(crate) fn of(camera: &Camera) -> Self {
-        Self {
-            size: [camera.width as u32, camera.height as u32],
-            intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy],
-            distortion: camera.distortion,
-            reserved: RESERVED,
-            fps: camera.fps,
-            bf: camera.bf,
-        }
-    }
-
-    pub(crate) fn into_camera(self) -> Camera {
-        let ([width, height], [fx, fy, cx, cy]) = (self.size.map(|s| s as usize), self.intrinsics);
-        Camera {
-            distortion: self.distortion,
-            fps: self.fps,
-            bf: self.bf,
-            ..Camera::pinhole(width, height, fx, fy, cx, cy)
-        }
     }
 }
 

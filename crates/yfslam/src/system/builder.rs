@@ -171,7 +171,7 @@ impl SlamBuilder {
 fn stereo_worker(camera: &Camera, context: &Context) -> Result<Option<StereoWorker>, SetupError> {
     let Context { sensor, config } = context;
     match config.depth.source {
-        DepthSource::Stereo if camera.distortion != [0.0; 5] => Err(SetupError::NotRectified(camera.distortion)),
+        DepthSource::Stereo if camera.is_distorted() => Err(SetupError::NotRectified(camera.distortion)),
         DepthSource::Stereo => {
             let (bf, fx) = (sensor.pinhole.bf, sensor.pinhole.fx);
             Ok(Some(StereoWorker::spawn(&config.features, &config.stereo, bf, fx)?))

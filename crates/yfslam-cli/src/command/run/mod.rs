@@ -25,7 +25,7 @@ use crate::output::recorder::RunOutputs;
 use crate::output::report::{ReportedRun, RunReport};
 use crate::output::summary;
 use crate::run::cost::frame_costs;
-use crate::run::evaluation::EvaluationArgs;
+use crate::run::evaluation::{EvaluationArgs, ScaleSource, scale_warning};
 use crate::run::map_args::MapArgs;
 use crate::run::method_run::{EvalContext, RunResult};
 use crate::run::shared_detector::{DetectionTally, SharedDetector};
@@ -149,6 +149,9 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let (boxes, detector) = boxes::choose(&args.detector, &args.source, &config, &methods, terminal)?;
     let mut source =
         Source::open(&args.source, config.depth.source, boxes.is_source().then_some(&*config.dynamic.movable))?;
+    for note in &source.camera.notes {
+        terminal.warn(&format!("camera {}: {note}", source.camera.origin));
+    }
     config.depth.source = source.depth_source;
     ensure!(
         !args.dense || config.depth.source == DepthSource::Image,
@@ -224,6 +227,7 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     let printed = terminal.result(&text);
     failures.check()?;
     interrupt.check()?;
+    warn_of_scale(&only_results, source, terminal);
     check_accuracy(args, &only_results, terminal)?;
     printed
 }
@@ -297,6 +301,20 @@ fn find_truth(args: &RunArgs, source: &Source, terminal: Terminal) -> Result<Opt
             Ok(None)
         }
         truth => truth.context("the ground truth cannot be used"),
+    }
+}
+
+/// Warns if lengths differ from those of the ground truth; the scale of a single camera is arbitrary.
+fn warn_of_scale(results: &[&RunResult], source: &Source, terminal: Terminal) {
+    let camera = &source.camera;
+    let scale = match source.depth_source {
+        DepthSource::Image => ScaleSource::DepthFactor(camera.depth_factor),
+        DepthSource::Stereo => ScaleSource::Baseline(camera.camera.bf / camera.camera.fx),
+        DepthSource::Motion => return,
+    };
+    let warning = results.iter().find_map(|result| scale_warning(result.evaluation()?, scale));
+    if let Some(warning) = warning {
+        terminal.warn(&warning);
     }
 }
 

@@ -13,7 +13,7 @@ use yfslam_io::decode::DecodeError;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
 use yfslam_io::{
     BoxList, CameraSource, DepthStatistics, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording,
-    detect_camera, load_camera,
+    complete_camera, detect_camera, load_camera,
 };
 
 use super::Source;
@@ -112,13 +112,12 @@ pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequ
     Ok((sequence, camera))
 }
 
-/// Names the camera of the folder that --camera replaces.
+/// Names the calibration of the layout that --camera replaces.
 fn replaced_camera(args: &SourceArgs, sequence: &Sequence) -> Option<String> {
     let given = args.camera.as_ref()?;
-    let own = ["camera.toml", "camera.yaml", "camera.yml"];
-    let own = own.iter().map(|name| args.folder().join(name)).find(|path| path.is_file());
-    let own = own.or_else(|| sequence.unread_calibration.clone())?;
-    let is_same = Path::new(given).canonicalize().ok().is_some_and(|given| own.canonicalize().ok() == Some(given));
+    let own = sequence.unread_calibration.as_ref()?;
+    let is_same =
+        Path::new(given).canonicalize().ok().is_some_and(|given| own.canonicalize().is_ok_and(|own| own == given));
     (!is_same).then(|| format!("--camera {given} is used; {} is not read", own.display()))
 }
 
@@ -129,9 +128,20 @@ fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
         (None, None) => detect_camera(args.folder())?,
     };
     if let Some(factor) = args.depth_factor {
-        source.depth_factor = factor;
+        if !source.missing.depth_factor && factor != source.depth_factor {
+            source.notes.push(format!("--depth-factor {factor} is used, not its own factor {}", source.depth_factor));
+        }
+        source.set_depth_factor(factor);
         source.origin += &format!(" with --depth-factor {factor}");
         check_camera(&source)?;
+    }
+    complete_camera(&mut source, sequence)?;
+    if args.camera.is_some()
+        && sequence.unread_calibration.is_none()
+        && let Ok(own) = detect_camera(args.folder())
+        && differs(&own, &source)
+    {
+        source.notes.push(format!("it is used, not the camera file of the folder, {}", own.origin));
     }
     Ok(source)
 }
@@ -145,6 +155,16 @@ fn recognised(sequence: &Sequence, camera: &CameraSource) -> String {
         DepthSource::Motion => "a single camera",
     };
     format!("{folder}: {layout}, {sensor}, {frames} frames; camera: {}", camera.origin)
+}
+
+/// Returns whether two calibrations differ in what both state.
+fn differs(own: &CameraSource, used: &CameraSource) -> bool {
+    let lens = |source: &CameraSource| {
+        let c = &source.camera;
+        ([c.fx, c.fy, c.cx, c.cy], c.distortion, c.rational)
+    };
+    let size = |source: &CameraSource| [source.camera.width, source.camera.height];
+    lens(own) != lens(used) || (!own.missing.size && size(own) != size(used))
 }
 
 /// Returns the name of the folder, also for `.` and similar paths.

@@ -86,12 +86,7 @@ fn name_render_threads() {
 
 /// Returns the camera of a world.
 pub fn world_camera(config: &WorldConfig) -> CameraSource {
-    CameraSource {
-        camera: config.camera.clone(),
-        depth_factor: config.depth_factor,
-        origin: "synthetic world".into(),
-        unused_keys: Vec::new(),
-    }
+    CameraSource::new(config.camera.clone(), config.depth_factor, "synthetic world")
 }
 
 impl Part {

@@ -77,7 +77,7 @@ pub fn calibration(
         }
         _ => {}
     }
-    let camera = CameraSource { camera, depth_factor, origin, unused_keys: Vec::new() };
+    let camera = CameraSource::new(camera, depth_factor, origin);
     check_camera(&camera)?;
     Ok(Some(Calibration { camera, rectification, depth_resampling: None }))
 }
