@@ -30,17 +30,22 @@ impl Compression {
     }
 }
 
+/// Returns a reader of what is packed.
+pub fn unpacker<'a>(compression: Compression, packed: &'a [u8]) -> io::Result<Box<dyn Read + 'a>> {
+    Ok(match compression {
+        Compression::None => Box::new(packed),
+        Compression::Bz2 => Box::new(bzip2::read::MultiBzDecoder::new(packed)),
+        Compression::Lz4 => Box::new(lz4_flex::frame::FrameDecoder::new(packed)),
+        Compression::Zstd => zstd(packed)?,
+    })
+}
+
 /// Unpacks `packed`, which was `length` bytes long.
 pub fn unpack(compression: Compression, packed: &[u8], length: u64) -> Result<Vec<u8>, String> {
     if length > MAX_UNPACKED_BYTES {
-        return Err(format!("it claims {length} bytes, more than {MAX_UNPACKED_BYTES} are not unpacked"));
+        return Err(too_long(length));
     }
-    let unpacked = match compression {
-        Compression::None => Ok(packed.to_vec()),
-        Compression::Bz2 => read(bzip2::read::MultiBzDecoder::new(packed), length, packed.len()),
-        Compression::Lz4 => read(lz4_flex::frame::FrameDecoder::new(packed), length, packed.len()),
-        Compression::Zstd => zstd(packed).and_then(|decoder| read(decoder, length, packed.len())),
-    };
+    let unpacked = unpacker(compression, packed).and_then(|decoder| read(decoder, length, packed.len()));
     let unpacked = unpacked.map_err(|error| error.to_string())?;
     match unpacked.len() as u64 == length {
         true => Ok(unpacked),
@@ -48,12 +53,31 @@ pub fn unpack(compression: Compression, packed: &[u8], length: u64) -> Result<Ve
     }
 }
 
+/// Says that a chunk is too long.
+pub fn too_long(length: u64) -> String {
+    format!("it claims {length} bytes, and no more than {MAX_UNPACKED_BYTES} are unpacked")
+}
+
 /// Unpacks a message that was packed on its own, as rosbag2 does; other messages stay as they are.
 pub fn unpack_message(bytes: &mut Vec<u8>) -> Result<(), String> {
-    if bytes.starts_with(&ZSTD_MAGIC) {
+    if is_packed(bytes) {
         let decoder = zstd(bytes).map_err(|error| error.to_string())?;
         let unpacked = read(decoder, MAX_UNPACKED_BYTES, bytes.len()).map_err(|error| error.to_string())?;
+        if unpacked.len() as u64 > MAX_UNPACKED_BYTES {
+            return Err(format!("it has more than {MAX_UNPACKED_BYTES} bytes"));
+        }
         *bytes = unpacked;
+    }
+    Ok(())
+}
+
+/// Unpacks the first `length` bytes of a message that was packed on its own; other messages stay as they are.
+pub fn unpack_head(bytes: &mut Vec<u8>, length: usize) -> Result<(), String> {
+    if is_packed(bytes) {
+        let decoder = zstd(bytes).map_err(|error| error.to_string())?;
+        let mut head = Vec::new();
+        decoder.take(length as u64).read_to_end(&mut head).map_err(|error| error.to_string())?;
+        *bytes = head;
     }
     Ok(())
 }
@@ -64,8 +88,15 @@ pub fn is_packed(bytes: &[u8]) -> bool {
     bytes.starts_with(&ZSTD_MAGIC)
 }
 
-fn zstd(packed: &[u8]) -> io::Result<ruzstd::decoding::StreamingDecoder<&[u8], ruzstd::decoding::FrameDecoder>> {
-    ruzstd::decoding::StreamingDecoder::new(packed).map_err(io::Error::other)
+#[cfg(not(feature = "zstd-c"))]
+fn zstd<'a>(packed: &'a [u8]) -> io::Result<Box<dyn Read + 'a>> {
+    let decoder = ruzstd::decoding::StreamingDecoder::new(packed).map_err(io::Error::other)?;
+    Ok(Box::new(decoder))
+}
+
+#[cfg(feature = "zstd-c")]
+fn zstd<'a>(packed: &'a [u8]) -> io::Result<Box<dyn Read + 'a>> {
+    Ok(Box::new(zstd::stream::read::Decoder::with_buffer(packed)?))
 }
 
 fn read(decoder: impl Read, length: u64, packed: usize) -> io::Result<Vec<u8>> {

@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::compression::{MAX_UNPACKED_BYTES, unpack};
-use super::{mcap, ros1};
+use super::{db3, mcap, ros1, sqlite};
 use crate::error::{Error, Result};
 
-/// Chunks that stay unpacked: those of the colour and the depth image, and their neighbours.
-const CACHED_CHUNKS: usize = 4;
+/// Most chunks that stay unpacked, and most bytes of them, but for the latest: enough for the look-ahead of the colour and the depth images.
+const CACHED_CHUNKS: usize = 16;
+const CACHED_BYTES: u64 = 24 << 20;
 
 /// Where a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +38,7 @@ impl Position {
 pub enum Format {
     Ros1,
     Mcap,
+    Db3,
 }
 
 impl Format {
@@ -45,6 +47,8 @@ impl Format {
             Some(Self::Ros1)
         } else if head.starts_with(mcap::MAGIC) {
             Some(Self::Mcap)
+        } else if head.starts_with(sqlite::MAGIC) {
+            Some(Self::Db3)
         } else {
             None
         }
@@ -105,6 +109,11 @@ impl BagFile {
     /// Reads the bytes of a message as they are stored.
     pub fn read(&self, position: Position, bytes: &mut Vec<u8>) -> Result<()> {
         let Position { length, chunk, offset, .. } = position;
+        if self.format == Format::Db3 {
+            return db3::read(self, offset, length, bytes).ok_or_else(|| {
+                Error::content(&self.path, format!("the row at byte {offset} is damaged"), "copy the bag again")
+            });
+        }
         if chunk == Position::NO_CHUNK {
             return self.read_at(offset, u64::from(length), bytes);
         }
@@ -133,7 +142,7 @@ impl BagFile {
             Some(Ok(bytes)) => bytes.len() as u64,
             _ => 0,
         };
-        while cache.len() >= CACHED_CHUNKS || cache.iter().map(bytes).sum::<u64>() > MAX_UNPACKED_BYTES {
+        while cache.len() >= CACHED_CHUNKS || cache.iter().map(bytes).sum::<u64>() > CACHED_BYTES {
             cache.remove(0);
         }
         cache.push(entry.clone());
@@ -149,6 +158,7 @@ impl BagFile {
         let head = match self.format {
             Format::Ros1 => ros1::chunk_head(&bytes),
             Format::Mcap => mcap::chunk_head(&bytes),
+            Format::Db3 => None,
         };
         let head = head.ok_or("its head cannot be read")??;
         self.read_at(chunk + head.data_offset, head.packed_length, &mut bytes).map_err(text)?;
@@ -176,9 +186,6 @@ fn not_a_bag(path: &Path, head: &[u8]) -> Error {
         }
         [0x28, 0xb5, 0x2f, 0xfd, ..] => {
             ("is packed as a whole with Zstandard", "unpack it with `zstd -d`, and name the unpacked file")
-        }
-        [b'S', b'Q', b'L', b'i', b't', b'e', ..] => {
-            ("is an SQLite file, which is not read yet", "convert it to MCAP with `ros2 bag convert`")
         }
         _ => ("is not a bag of ROS 1 (.bag), MCAP (.mcap) or rosbag2 (.db3)", "copy the bag again"),
     };

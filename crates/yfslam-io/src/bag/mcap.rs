@@ -1,11 +1,9 @@
 //! MCAP (the specification of version 0 at mcap.dev): records of one byte of kind, eight of length, and their content.
 
-use std::io::{Read, Seek};
-
 use super::compression::Compression;
 use super::fields::Fields;
 use super::file::BagFile;
-use super::walk::{ChunkHead, Records, Stop, Walk};
+use super::walk::{ChunkHead, Records, Source, Stop, Walk};
 use crate::error::Result;
 use crate::message::wire::Wire;
 
@@ -71,7 +69,7 @@ pub fn chunk_head(bytes: &[u8]) -> Option<std::result::Result<ChunkHead, String>
 }
 
 /// Goes through the records of a file.
-pub fn walk<R: Read + Seek>(walk: &mut Walk<'_>, records: &mut Records<R>) -> std::result::Result<(), Stop> {
+pub fn walk<R: Source>(walk: &mut Walk<'_>, records: &mut Records<R>) -> std::result::Result<(), Stop> {
     if records.at == 0 {
         records.skip(MAGIC.len() as u64)?;
     }
@@ -88,7 +86,7 @@ pub fn walk<R: Read + Seek>(walk: &mut Walk<'_>, records: &mut Records<R>) -> st
 }
 
 /// Goes through the records of a chunk.
-fn inner<R: Read + Seek>(walk: &mut Walk<'_>, records: &mut Records<R>) -> std::result::Result<(), Stop> {
+fn inner<R: Source>(walk: &mut Walk<'_>, records: &mut Records<R>) -> std::result::Result<(), Stop> {
     while records.left() > 0 {
         let begin = records.at;
         let (kind, length) = record_head(records)?;
@@ -98,14 +96,14 @@ fn inner<R: Read + Seek>(walk: &mut Walk<'_>, records: &mut Records<R>) -> std::
 }
 
 /// Returns the kind and the length of the next record.
-fn record_head<R: Read + Seek>(records: &mut Records<R>) -> std::result::Result<(u8, u64), Stop> {
+fn record_head<R: Source>(records: &mut Records<R>) -> std::result::Result<(u8, u64), Stop> {
     let begin = records.at;
     let mut head = Fields(records.take(RECORD_HEAD)?);
     head.u8().zip(head.u64()).ok_or(Stop::Truncated(begin))
 }
 
 /// Reads a record that is not a chunk.
-fn record<R: Read + Seek>(
+fn record<R: Source>(
     walk: &mut Walk<'_>,
     records: &mut Records<R>,
     begin: u64,
@@ -138,7 +136,7 @@ fn record<R: Read + Seek>(
     }
 }
 
-fn chunk<R: Read + Seek>(
+fn chunk<R: Source>(
     outer: &mut Walk<'_>,
     records: &mut Records<R>,
     begin: u64,

@@ -10,12 +10,14 @@
 //! their next message. A damaged or unfinished bag is read as far as it goes; [`Bag::notes`] and [`Visited::notes`] say so.
 
 mod compression;
+mod db3;
 mod fields;
 mod file;
 mod folder;
 mod mcap;
 mod message_ref;
 mod ros1;
+mod sqlite;
 mod topics;
 mod walk;
 

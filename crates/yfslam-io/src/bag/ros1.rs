@@ -1,11 +1,9 @@
 //! The bag of ROS 1, version 2.0: records of a head, which is a list of `name=value`, and their data, each with its length before it.
 
-use std::io::{Read, Seek};
-
 use super::compression::Compression;
 use super::fields::Fields;
 use super::file::BagFile;
-use super::walk::{ChunkHead, Records, Stop, Walk};
+use super::walk::{ChunkHead, Records, Source, Stop, Walk};
 use crate::error::Result;
 use crate::message::wire::Wire;
 
@@ -48,7 +46,7 @@ fn chunk_of(head: Head<'_>, data_offset: u64, packed_length: u64) -> Option<std:
 }
 
 /// Goes through the records of a file.
-pub fn walk<R: Read + Seek>(walk: &mut Walk<'_>, records: &mut Records<R>) -> std::result::Result<(), Stop> {
+pub fn walk<R: Source>(walk: &mut Walk<'_>, records: &mut Records<R>) -> std::result::Result<(), Stop> {
     if records.at == 0 {
         records.skip(MAGIC.len() as u64)?;
     }
@@ -59,11 +57,7 @@ pub fn walk<R: Read + Seek>(walk: &mut Walk<'_>, records: &mut Records<R>) -> st
 }
 
 /// Reads the next record; chunks are in the file only.
-fn record<R: Read + Seek>(
-    walk: &mut Walk<'_>,
-    records: &mut Records<R>,
-    in_file: bool,
-) -> std::result::Result<(), Stop> {
+fn record<R: Source>(walk: &mut Walk<'_>, records: &mut Records<R>, in_file: bool) -> std::result::Result<(), Stop> {
     let begin = records.at;
     let truncated = Stop::Truncated(begin);
     let Some(head_length) = Fields(records.take(4.min(records.left()))?).u32() else { return Err(truncated) };
@@ -106,7 +100,7 @@ fn record<R: Read + Seek>(
     Ok(())
 }
 
-fn chunk<R: Read + Seek>(
+fn chunk<R: Source>(
     outer: &mut Walk<'_>,
     records: &mut Records<R>,
     begin: u64,
@@ -137,7 +131,7 @@ fn chunk<R: Read + Seek>(
 }
 
 /// Goes through the records of a chunk.
-fn inner<R: Read + Seek>(walk: &mut Walk<'_>, records: &mut Records<R>) -> std::result::Result<(), Stop> {
+fn inner<R: Source>(walk: &mut Walk<'_>, records: &mut Records<R>) -> std::result::Result<(), Stop> {
     while records.left() > 0 {
         record(walk, records, false)?;
     }

@@ -2,17 +2,21 @@
 //!
 //! In: a file, and which topics are needed. Out: calls of a visitor; notes about what is damaged.
 
-use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 
-use super::compression::{Compression, MAX_UNPACKED_BYTES, is_packed, unpack, unpack_message};
+use super::compression::{Compression, MAX_UNPACKED_BYTES, is_packed, too_long, unpack_head, unpack_message, unpacker};
 use super::file::{BagFile, Format, Position};
 use super::topics::Topics;
-use super::{mcap, ros1};
+use super::{db3, mcap, ros1};
 use crate::error::{Error, Result};
 
 /// Bytes of a message that [`Need::Head`] gives: a header with long names, and what follows up to the encoding.
-const HEAD_BYTES: usize = 512;
+pub const HEAD_BYTES: usize = 512;
+
+/// Bytes that are read at once.
+const READ_AT_ONCE: usize = 4 << 20;
 
 /// Most notes that are kept of one file.
 const MAX_NOTES: usize = 20;
@@ -81,7 +85,34 @@ impl From<std::io::Error> for Stop {
     }
 }
 
-impl<R: Read + Seek> Records<R> {
+/// What records are read from.
+pub trait Source {
+    fn read_exact(&mut self, into: &mut [u8]) -> io::Result<()>;
+    fn skip(&mut self, length: u64) -> io::Result<()>;
+}
+
+impl Source for BufReader<File> {
+    fn read_exact(&mut self, into: &mut [u8]) -> io::Result<()> {
+        Read::read_exact(self, into)
+    }
+
+    fn skip(&mut self, length: u64) -> io::Result<()> {
+        self.seek_relative(i64::try_from(length).map_err(io::Error::other)?)
+    }
+}
+
+/// A chunk that is unpacked while it is read.
+impl Source for Box<dyn Read + '_> {
+    fn read_exact(&mut self, into: &mut [u8]) -> io::Result<()> {
+        Read::read_exact(self, into)
+    }
+
+    fn skip(&mut self, length: u64) -> io::Result<()> {
+        io::copy(&mut self.take(length), &mut io::sink()).map(|_| ())
+    }
+}
+
+impl<R: Source> Records<R> {
     pub fn left(&self) -> u64 {
         self.end.saturating_sub(self.at)
     }
@@ -91,8 +122,13 @@ impl<R: Read + Seek> Records<R> {
         if length > self.left() || length > MAX_UNPACKED_BYTES {
             return Err(Stop::Truncated(self.at));
         }
-        self.buffer.resize(length as usize, 0);
-        self.reader.read_exact(&mut self.buffer)?;
+        self.buffer.clear();
+        while (self.buffer.len() as u64) < length {
+            // Memory for what a forged length claims is taken only as the data arrive.
+            let before = self.buffer.len();
+            self.buffer.resize((before + READ_AT_ONCE).min(length as usize), 0);
+            self.reader.read_exact(self.buffer.get_mut(before..).unwrap_or_default())?;
+        }
         self.at += length;
         Ok(&self.buffer)
     }
@@ -101,7 +137,10 @@ impl<R: Read + Seek> Records<R> {
         if length > self.left() {
             return Err(Stop::Truncated(self.at));
         }
-        self.reader.seek_relative(i64::try_from(length).map_err(|_| Stop::Truncated(self.at))?)?;
+        // The rest of a packed chunk need not be unpacked.
+        if self.chunk == Position::NO_CHUNK || length < self.left() {
+            self.reader.skip(length)?;
+        }
         self.at += length;
         Ok(())
     }
@@ -135,6 +174,12 @@ impl<'a> Walk<'a> {
     /// Reads the topics and counts from the summary; returns whether the file has one that is complete.
     pub fn summary(&mut self, file: &BagFile) -> Result<bool> {
         let start = match file.format {
+            // The table of messages is its own index; counting them reads none of their pages.
+            Format::Db3 => {
+                self.counts = true;
+                self.note_log(file);
+                return Ok(matches!(db3::walk(self, file), Ok(())));
+            }
             Format::Ros1 => ros1::summary_start(file)?,
             Format::Mcap => mcap::summary_start(file)?,
         };
@@ -165,6 +210,9 @@ impl<'a> Walk<'a> {
 
     /// Goes through the records from a byte to the end of the file.
     fn range(&mut self, file: &BagFile, start: u64) -> Result<std::result::Result<(), Stop>> {
+        if file.format == Format::Db3 {
+            return Ok(db3::walk(self, file));
+        }
         let failed = |source| Error::read(file.path(), source);
         let mut reader = BufReader::with_capacity(4096, file.reopen()?);
         reader.seek(SeekFrom::Start(start)).map_err(failed)?;
@@ -173,28 +221,37 @@ impl<'a> Walk<'a> {
         Ok(match file.format {
             Format::Ros1 => ros1::walk(self, &mut records),
             Format::Mcap => mcap::walk(self, &mut records),
+            Format::Db3 => Ok(()),
         })
     }
 
     /// Goes through a chunk that begins at byte `begin`, and whose packed records come next.
-    pub fn chunk<R: Read + Seek>(
+    pub fn chunk<R: Source>(
         &mut self,
         records: &mut Records<R>,
         begin: u64,
         head: ChunkHead,
-        walk: impl FnOnce(&mut Self, &mut Records<Cursor<Vec<u8>>>) -> std::result::Result<(), Stop>,
+        walk: impl FnOnce(&mut Self, &mut Records<Box<dyn Read + '_>>) -> std::result::Result<(), Stop>,
     ) -> std::result::Result<(), Stop> {
         let packed = records.take(head.packed_length)?;
-        let unpacked = match unpack(head.compression, packed, head.unpacked_length) {
-            Ok(unpacked) => unpacked,
-            Err(problem) => {
+        let end = head.unpacked_length;
+        let reader = match unpacker(head.compression, packed) {
+            Ok(reader) if end <= MAX_UNPACKED_BYTES => reader,
+            problem => {
+                let problem = problem.map_or_else(|error| error.to_string(), |_| too_long(end));
                 self.note(format!("the chunk at byte {begin} is damaged ({problem}); its messages are left out"));
                 return Ok(());
             }
         };
-        let end = unpacked.len() as u64;
-        let mut inner = Records { reader: Cursor::new(unpacked), at: 0, end, chunk: begin, buffer: Vec::new() };
+        let mut inner = Records { reader, at: 0, end, chunk: begin, buffer: Vec::new() };
         match walk(self, &mut inner) {
+            Err(Stop::Failed(error)) => {
+                let at = inner.at;
+                self.note(format!(
+                    "the chunk at byte {begin} is damaged from its byte {at} on ({error}); its other messages are used"
+                ));
+                Ok(())
+            }
             Err(Stop::Truncated(at) | Stop::Damaged(at)) => {
                 self.note(format!(
                     "the chunk at byte {begin} is damaged from its byte {at} on; its other messages are used"
@@ -206,7 +263,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Takes a message of `length` bytes that comes next; `time_ns` is when it was received.
-    pub fn message<R: Read + Seek>(
+    pub fn message<R: Source>(
         &mut self,
         records: &mut Records<R>,
         connection: u32,
@@ -216,12 +273,8 @@ impl<'a> Walk<'a> {
         if length > records.left() {
             return Err(Stop::Truncated(records.at));
         }
-        if self.counts {
-            self.topics.count(self.file, connection, 1);
-            self.widen_span(time_ns, time_ns);
-        }
-        let Some(topic) = self.topics.of(self.file, connection) else { return records.skip(length) };
-        let need = self.needs.get(topic).copied().unwrap_or_default();
+        self.count(connection, time_ns);
+        let Some((topic, need)) = self.need(connection) else { return records.skip(length) };
         let Some(bounded) = u32::try_from(length).ok().filter(|&length| u64::from(length) <= MAX_UNPACKED_BYTES) else {
             self.note(format!("a message of {length} bytes is left out"));
             return records.skip(length);
@@ -229,22 +282,66 @@ impl<'a> Walk<'a> {
         let position = Position { file: self.file, length: bounded, chunk: records.chunk, offset: records.at };
         let head = (HEAD_BYTES as u64).min(length);
         let mut bytes = match need {
-            Need::Skip => return records.skip(length),
             Need::Head => records.take(head)?.to_vec(),
-            Need::Whole => records.take(length)?.to_vec(),
+            _ => records.take(length)?.to_vec(),
         };
         if need == Need::Head && is_packed(&bytes) {
             bytes.extend(records.take(length - head)?);
         } else if need == Need::Head {
             records.skip(length - head)?;
         }
-        if let Err(problem) = unpack_message(&mut bytes) {
+        self.deliver(topic, need, time_ns, position, bytes)
+    }
+
+    /// Counts a message if messages are counted.
+    pub fn count(&mut self, connection: u32, time_ns: i64) {
+        if self.counts {
+            self.topics.count(self.file, connection, 1);
+            self.widen_span(time_ns, time_ns);
+        }
+    }
+
+    /// Returns the topic of a connection and what is needed of its messages; `None` if nothing is.
+    pub fn need(&self, connection: u32) -> Option<(usize, Need)> {
+        let topic = self.topics.of(self.file, connection)?;
+        let need = self.needs.get(topic).copied().filter(|need| *need != Need::Skip)?;
+        Some((topic, need))
+    }
+
+    /// Unpacks a message and hands it to the visitor.
+    pub fn deliver(
+        &mut self,
+        topic: usize,
+        need: Need,
+        time_ns: i64,
+        position: Position,
+        mut bytes: Vec<u8>,
+    ) -> std::result::Result<(), Stop> {
+        let unpacked = match need {
+            Need::Head => unpack_head(&mut bytes, HEAD_BYTES),
+            _ => unpack_message(&mut bytes),
+        };
+        if let Err(problem) = unpacked {
             self.note(format!("a message at byte {} is damaged ({problem}) and left out", position.offset));
             return Ok(());
         }
         match (self.visit)(Found { topic, received_ns: time_ns, position, bytes: &bytes }) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Stop::Done),
+        }
+    }
+
+    /// Notes that a recorder has left messages outside the file.
+    fn note_log(&mut self, file: &BagFile) {
+        let mut log = file.path().as_os_str().to_owned();
+        log.push("-wal");
+        if std::fs::metadata(&log).is_ok_and(|log| log.len() > 0) {
+            let path = file.path().display();
+            self.note(format!(
+                "the last messages of {path} are in the file {} beside it and are not read; `sqlite3 {path} 'PRAGMA wal_checkpoint'` moves \
+                 them",
+                std::path::Path::new(&log).display()
+            ));
         }
     }
 

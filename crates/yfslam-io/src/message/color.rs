@@ -14,7 +14,7 @@ const KIND_CURE: &str = "the colour encodings are rgb8, bgr8, rgba8, bgra8, mono
 /// Decodes a colour image into `into`.
 pub fn decode(image: &Image<'_>, expected: Option<ImageSize>, into: &mut RgbImage) -> Result<(), DecodeError> {
     match image.encoding {
-        "rgb8" => each::<3>(image, expected, into, |rgb| rgb),
+        "rgb8" => rgb(image, expected, into),
         // OpenCV's names do not say the order of the colours; its images are BGR.
         "bgr8" | "8UC3" => each::<3>(image, expected, into, |[b, g, r]| [r, g, b]),
         "rgba8" => each::<4>(image, expected, into, |[r, g, b, _]| [r, g, b]),
@@ -34,6 +34,15 @@ pub fn decode(image: &Image<'_>, expected: Option<ImageSize>, into: &mut RgbImag
             None => Err(DecodeError::WrongKind { found: format!("an image in encoding '{other}'"), cure: KIND_CURE }),
         },
     }
+}
+
+fn rgb(image: &Image<'_>, expected: Option<ImageSize>, into: &mut RgbImage) -> Result<(), DecodeError> {
+    let (size, rows) = rows(image, 3, expected, SIZE_CURE)?;
+    into.resize(size.width, size.height);
+    for (to, from) in into.data_mut().as_flattened_mut().chunks_exact_mut(3 * size.width).zip(rows) {
+        to.copy_from_slice(from);
+    }
+    Ok(())
 }
 
 fn each<const N: usize>(

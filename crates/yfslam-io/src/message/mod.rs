@@ -161,3 +161,6 @@ fn rows<'a>(
     }
     Ok((size, image.data.chunks(step).take(size.height).map(move |row| row.get(..needed).unwrap_or(&[]))))
 }
+
+#[cfg(test)]
+mod tests;
