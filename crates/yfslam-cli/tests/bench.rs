@@ -131,3 +131,54 @@ fn recordings_of_the_same_name_are_distinguished_by_their_parents() {
     }
     fails(root, &["bench", "c/x y", "c/x_y", "--methods", "none"], &["c/x y", "c/x_y", "rename one of the folders"]);
 }
+
+#[test]
+fn trajectories_of_other_systems_stand_in_the_same_tables_figures_and_statistics() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let args = ["bench", EMPTY, "--methods", "none", "--seeds", "2", "--frames", "12", "--out", "b"];
+    succeeds(root, &args);
+    // The other system has the same trajectory for the second seed, and a worse one for the first.
+    fs::create_dir(root.join("other")).unwrap();
+    let runs = root.join("b/runs");
+    let mut keys: Vec<String> =
+        fs::read_dir(&runs).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    keys.sort();
+    let text = |key: &str| fs::read_to_string(runs.join(key).join("none/trajectory.txt")).unwrap();
+    let shifted = |(index, line): (usize, &str)| {
+        let mut columns: Vec<String> = line.split(' ').map(str::to_owned).collect();
+        if index % 2 == 1 && !line.starts_with('#') {
+            columns[1] = (columns[1].parse::<f64>().unwrap() + 0.05).to_string();
+        }
+        columns.join(" ") + "\n"
+    };
+    let worse: String = text(&keys[0]).lines().enumerate().map(shifted).collect();
+    fs::write(root.join("other").join(format!("{}.txt", keys[0].trim_end_matches("-1"))), worse).unwrap();
+    fs::write(root.join("other").join(format!("{}.txt", keys[1])), text(&keys[1])).unwrap();
+    succeeds(root, &[&args[..], &["--external", "Other=other"]].concat());
+    let read = |name: &str| fs::read_to_string(root.join("b").join(name)).unwrap();
+    let cells = read("cells.csv");
+    let figures = |start: &str| {
+        let line = cells.lines().find(|line| line.contains(start)).unwrap_or_else(|| panic!("no {start} in {cells}"));
+        line.split_once(start).unwrap().1.split(',').next().unwrap().parse::<f64>().unwrap()
+    };
+    // Trajectory files have nine decimals.
+    assert!((figures(",none,2,") - figures(",Other,2,")).abs() < 1e-6, "{cells}");
+    assert!(figures(",Other,1,") > figures(",none,1,"), "{cells}");
+    assert!(read("summary.csv").contains(",Other,2,0,"), "{}", read("summary.csv"));
+    assert!(read("tables/paired.csv").contains("Other,none,2,"), "{}", read("tables/paired.csv"));
+    let latex = read("tables/ate.tex");
+    assert!(latex.contains("\\toprule") && latex.contains("& none & \\textbf{"), "{latex}");
+    assert!(read("report.html").contains("data:image/svg+xml;base64,"));
+    let drawn: Vec<_> = fs::read_dir(root.join("b/figures")).unwrap().collect();
+    assert!(drawn.len() >= 4, "{drawn:?}");
+    let svg = read(&format!("figures/{}-trajectory-from-above.svg", keys[0]));
+    assert!(svg.contains("Other") && svg.contains("ground truth"));
+    // A sequence without a trajectory of the other system is a failed run.
+    fs::create_dir(root.join("empty")).unwrap();
+    let output = succeeds(root, &[&args[..], &["--external", "Other=empty"]].concat());
+    assert!(output.stderr.contains("no trajectory such as"), "{}", output.stderr);
+    fails(root, &[&args[..], &["--external", "none=other"]].concat(), &["another name"]);
+    fails(root, &[&args[..], &["--external", "Other=nowhere"]].concat(), &["nowhere", "does not exist"]);
+    fails(root, &[&args[..], &["--external", "Other"]].concat(), &["NAME=FILE"]);
+}

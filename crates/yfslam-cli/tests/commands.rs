@@ -62,7 +62,7 @@ fn ape_and_rpe_take_the_options_of_evo_and_print_one_error() {
     let refused = |args: &[&str], words: &[&str]| fails(folder.path(), args, words);
     refused(&["ape", "truth.txt", "estimate.txt", "-r", "angle_deg"], &["trans_part", "yfslam rpe"]);
     refused(&["ape", "truth.txt", "estimate.txt", "-s"], &["--align"]);
-    refused(&["ape", "kitti", "truth.txt", "estimate.txt"], &["kitti", "TUM format"]);
+    refused(&["ape", "bag", "truth.txt", "estimate.txt"], &["bag", "tum, kitti or euroc"]);
     refused(&["ape", "truth.txt", "estimate.txt", "-ap"], &["--plot", "--report"]);
     refused(&["rpe", "truth.txt", "estimate.txt", "-d", "1.5"], &["1.5 frames", "whole number"]);
     refused(&["rpe", "truth.txt", "estimate.txt", "-u", "d"], &["'d'", "f, s, m"]);
@@ -120,9 +120,22 @@ fn the_printed_configuration_can_be_read_again() {
 fn help_lists_every_command_and_completions_exist_for_every_shell() {
     let folder = tempfile::tempdir().unwrap();
     let help = succeeds(folder.path(), &["--help"]).stdout;
-    for command in
-        ["run", "eval", "ape", "rpe", "demo", "detect", "synth", "bench", "calibrate", "info", "config", "completions"]
-    {
+    for command in [
+        "run",
+        "eval",
+        "ape",
+        "rpe",
+        "convert",
+        "demo",
+        "detect",
+        "synth",
+        "bench",
+        "calibrate",
+        "camera",
+        "info",
+        "config",
+        "completions",
+    ] {
         assert!(help.contains(&format!("  {command} ")), "{help}");
         let own = succeeds(folder.path(), &[command, "--help"]).stdout;
         assert!(own.contains("Examples:"), "{own}");

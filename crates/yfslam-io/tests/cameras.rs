@@ -249,7 +249,8 @@ fn the_rational_model_is_read_from_the_dialects_that_have_it() {
          distortion_coefficients: {{rows: 1, cols: 8, data: [{eight}]}}\n"
     );
     let colmap = format!("7 FULL_OPENCV 640 480 611.5 612.25 319.25 244 {}\n", eight.replace(',', ""));
-    let wanted = camera().with_rational_distortion([0.02, -0.03, 0.004]);
+    let mut wanted = camera();
+    wanted.rational = [0.02, -0.03, 0.004];
     for (name, text) in [("ros.yaml", ros), ("cameras.txt", colmap)] {
         let source = parse(name, &text);
         assert_eq!((source.camera.distortion, source.camera.rational), (wanted.distortion, wanted.rational), "{name}");
@@ -310,6 +311,12 @@ fn what_changes_the_image_is_refused_with_key_and_cure() {
             ["c.txt:2", "several cameras", "keep"],
         ),
         ("n.txt", "1 2 3 4 5\n".into(), ["n.txt", "5 numbers", "fx fy cx cy"]),
+        ("d.txt", "0.5 0.7 0.5 0.5 0.9\n640 480\ncrop\n640 480\n".into(), ["d.txt", "begins with numbers", "relative"]),
+        (
+            "t.json",
+            "{\"fl_x\": 600.0, \"camera_model\": \"OPENCV_FISHEYE\"}".into(),
+            ["t.json", "OPENCV_FISHEYE", "undistort"],
+        ),
         ("x.xml", "<?xml version=\"1.0\"?>\n<opencv_storage/>\n".into(), ["x.xml", "XML", "YAML"]),
         ("o.ini", "# oST version 5.0 parameters\n[image]\n\nwidth\n640\n".into(), ["o.ini", "[image]", "YAML"]),
         ("j.json", "{\"width\": 640,\n \"height\" 480}".into(), ["j.json:2", "JSON", "repair"]),

@@ -27,6 +27,7 @@ mod table;
 
 pub use content::{DenseMapImages, Frames, MethodReport, ProcessorTime, Report, Snapshot, Stage, Times};
 pub use evaluation::{errors_table, evaluation_table, rpe_errors};
+pub use figures::boxes::errors_over_runs;
 pub use figures::files::FigureFile;
 pub use html::tables_page::{IMPROVEMENT, ORIGIN, PUBLISHED, TableSection, TablesPage};
 pub use table::{Table, TableStyle};

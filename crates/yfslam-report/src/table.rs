@@ -1,5 +1,7 @@
 //! In: headers and cells. Out: the table as plain text for a terminal, as Markdown, as LaTeX or as CSV.
 
+use std::collections::BTreeSet;
+
 /// How a table is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TableStyle {
@@ -8,7 +10,7 @@ pub enum TableStyle {
     Plain,
     /// GitHub Markdown, aligned in its source as well.
     Markdown,
-    /// A LaTeX `tabular` that needs no package.
+    /// A LaTeX `tabular` with the rules of the package `booktabs`; the best figures are bold.
     Latex,
     /// Comma-separated values (RFC 4180): cells with a comma, a quote or a line break are quoted.
     Csv,
@@ -18,17 +20,31 @@ pub enum TableStyle {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     rows: Vec<Vec<String>>,
+    /// Row and column of cells that are bold in LaTeX.
+    bold: BTreeSet<(usize, usize)>,
 }
 
 impl Table {
     /// Creates an empty table with the given column headers.
     pub fn new<S: Into<String>>(headers: impl IntoIterator<Item = S>) -> Self {
-        Self { rows: vec![headers.into_iter().map(Into::into).collect()] }
+        Self { rows: vec![headers.into_iter().map(Into::into).collect()], bold: BTreeSet::new() }
     }
 
     /// Appends a row; missing cells stay empty.
     pub fn push<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
         self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+
+    /// Marks the smallest figures of a column as the best ones, among rows with the same first cell.
+    pub fn mark_smallest(&mut self, column: usize) {
+        let figure = |row: &Vec<String>| row.get(column).and_then(|cell| cell.parse::<f64>().ok());
+        let best_of = |name: Option<&String>| {
+            let same = self.rows.iter().skip(1).filter(|row| row.first() == name);
+            same.filter_map(figure).fold(f64::INFINITY, f64::min)
+        };
+        let is_best = |row: &Vec<String>| figure(row).is_some_and(|value| value <= best_of(row.first()));
+        let best: Vec<usize> = (1..self.rows.len()).filter(|at| self.rows.get(*at).is_some_and(is_best)).collect();
+        self.bold.extend(best.into_iter().map(|row| (row, column)));
     }
 
     /// Returns the headers, then the rows.
@@ -81,15 +97,20 @@ impl Table {
     }
 
     fn latex(&self, columns: usize) -> String {
-        let line = |row: &Vec<String>| {
-            let cells: Vec<_> = (0..columns).map(|c| latex_text(row.get(c).map_or("", String::as_str))).collect();
-            cells.join(" & ") + " \\\\\n"
+        let line = |(index, row): (usize, &Vec<String>)| {
+            let cell = |column: usize| {
+                let text = latex_text(row.get(column).map_or("", String::as_str));
+                if self.bold.contains(&(index, column)) { format!("\\textbf{{{text}}}") } else { text }
+            };
+            (0..columns).map(cell).collect::<Vec<_>>().join(" & ") + " \\\\\n"
         };
-        let mut lines = self.rows.iter().map(line);
+        let mut lines = self.rows.iter().enumerate().map(line);
         let headers = lines.next().unwrap_or_default();
         let alignment = "l".to_owned() + &"r".repeat(columns.saturating_sub(1));
         let rows: String = lines.collect();
-        format!("\\begin{{tabular}}{{{alignment}}}\n\\hline\n{headers}\\hline\n{rows}\\hline\n\\end{{tabular}}\n")
+        format!(
+            "% \\usepackage{{booktabs}}\n\\begin{{tabular}}{{{alignment}}}\n\\toprule\n{headers}\\midrule\n{rows}\\bottomrule\n\\end{{tabular}}\n"
+        )
     }
 }
 
@@ -144,9 +165,21 @@ mod tests {
     fn latex_escapes_what_it_would_interpret() {
         let mut table = Table::new(["sequence", "improvement (%)"]);
         table.push(["walking_xyz", "−0.5 & more"]);
-        let expected = "\\begin{tabular}{lr}\n\\hline\nsequence & improvement (\\%) \\\\\n\\hline\n\
-                        walking\\_xyz & $-$0.5 \\& more \\\\\n\\hline\n\\end{tabular}\n";
+        let expected = "% \\usepackage{booktabs}\n\\begin{tabular}{lr}\n\\toprule\nsequence & improvement (\\%) \\\\\n\\midrule\n\
+                        walking\\_xyz & $-$0.5 \\& more \\\\\n\\bottomrule\n\\end{tabular}\n";
         assert_eq!(table.render(TableStyle::Latex), expected);
+    }
+
+    #[test]
+    fn the_best_figures_of_each_sequence_are_bold_in_latex() {
+        let mut table = Table::new(["sequence", "system", "RMSE"]);
+        for row in [["a", "x", "0.2"], ["a", "y", "0.1"], ["a", "z", "-"], ["b", "x", "0.4"], ["b", "y", "0.5"]] {
+            table.push(row);
+        }
+        table.mark_smallest(2);
+        let latex = table.render(TableStyle::Latex);
+        let bold: Vec<&str> = latex.lines().filter(|line| line.contains("textbf")).collect();
+        assert_eq!(bold, ["a & y & \\textbf{0.1} \\\\", "b & x & \\textbf{0.4} \\\\"]);
     }
 
     #[test]

@@ -93,15 +93,8 @@ impl Camera {
         self
     }
 
-    /// Sets the coefficients k4, k5, k6 of the rational model (OpenCV order: k1, k2, p1, p2, k3, k4, k5, k6).
-    #[must_use]
-    pub fn with_rational_distortion(mut self, rational: [f64; 3]) -> Self {
-        self.rational = rational;
-        self
-    }
-
     /// Returns whether the images have lens distortion.
-    pub fn is_distorted(&self) -> bool {
+    pub(crate) fn is_distorted(&self) -> bool {
         self.distortion != [0.0; 5] || !is_polynomial(&self.rational)
     }
 
@@ -172,9 +165,8 @@ mod tests {
 
     /// A wide-angle colour camera as the Azure Kinect has one; numbers of that order, made up.
     fn wide() -> Camera {
-        Camera::pinhole(1280, 720, 607.0, 606.8, 638.2, 366.9)
-            .with_distortion([0.5, -2.6, 3e-4, -2e-4, 1.5])
-            .with_rational_distortion([0.38, -2.45, 1.44])
+        let camera = Camera::pinhole(1280, 720, 607.0, 606.8, 638.2, 366.9);
+        Camera { rational: [0.38, -2.45, 1.44], ..camera.with_distortion([0.5, -2.6, 3e-4, -2e-4, 1.5]) }
     }
 
     #[test]

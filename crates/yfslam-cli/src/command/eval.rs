@@ -13,7 +13,7 @@ use yfslam_eval::{
 use yfslam_report::{Table, TableStyle, evaluation_table};
 
 use crate::input::trajectory::read_compared;
-use crate::output::plots::write_plots;
+use crate::output::plots::{Plotted, figures, name_of, write_figures};
 use crate::run::evaluation::{EvaluationArgs, ScaleSource, evaluate_possible, scale_warning};
 use crate::ui::terminal::{Terminal, print};
 
@@ -150,12 +150,14 @@ pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
     }
     let versus = args.versus.as_deref().zip(others.first()).map(|(path, other)| evaluated(path, other)).transpose()?;
     if let Some(folder) = &args.plots {
-        let first = Some((args.estimate.as_path(), estimate.as_slice(), &evaluation));
+        let plotted = |path: &Path, trajectory, evaluation| Plotted { name: name_of(path), trajectory, evaluation };
         let second = args.versus.as_deref().zip(others.first()).zip(versus.as_ref());
-        let second = second.map(|((path, other), versus)| (path, other.as_slice(), versus));
-        let estimates: Vec<_> = first.into_iter().chain(second).collect();
-        let written = write_plots(folder, &args.groundtruth, truth, &estimates)?;
-        terminal.note(&format!("{written} figures written to {}, each as SVG and PDF", folder.display()));
+        let second = second.map(|((path, other), versus)| plotted(path, other, versus));
+        let estimates: Vec<Plotted> =
+            [plotted(&args.estimate, estimate, &evaluation)].into_iter().chain(second).collect();
+        let figures = figures(&name_of(&args.groundtruth), truth, &estimates);
+        write_figures(folder, "", &figures)?;
+        terminal.note(&format!("{} figures written to {}, each as SVG and PDF", figures.len(), folder.display()));
     }
     let improvement_percent = versus.as_ref().map(|versus| improvements(&evaluation, versus));
     let calibration = args.calibrate.then(|| calibrate(truth, estimate, max_diff_ns)).transpose();

@@ -64,6 +64,9 @@ struct CommonArgs {
     /// Correct the scale, too; only together with -a.
     #[arg(short = 's', long = "correct_scale", requires = "align")]
     correct_scale: bool,
+    /// Bring the first poses together instead.
+    #[arg(long = "align_origin", conflicts_with = "align")]
+    align_origin: bool,
     /// Which part of the error is computed.
     #[arg(short = 'r', long = "pose_relation", value_enum, default_value = "trans_part")]
     relation: Relation,
@@ -107,7 +110,11 @@ pub fn run_ape(args: &ApeArgs, terminal: Terminal) -> Result<()> {
         "`yfslam ape` computes the error of translation only; use -r trans_part, or `yfslam rpe` for rotation"
     );
     let (matches, path) = args.common.matches(terminal)?;
-    let kind = if args.common.correct_scale { AlignmentKind::Sim3 } else { AlignmentKind::Se3 };
+    let kind = match (args.common.correct_scale, args.common.align_origin) {
+        (_, true) => AlignmentKind::Origin,
+        (true, false) => AlignmentKind::Sim3,
+        (false, false) => AlignmentKind::Se3,
+    };
     let error = ate(&matches, kind).with_context(|| cannot_evaluate(path))?;
     print_errors([(format!("ATE, {kind} (m)"), error.translation_m)], matches.len())
 }

@@ -5,20 +5,19 @@ use std::path::Path;
 use anyhow::Result;
 use yfslam_eval::{Evaluation, StampedPose};
 use yfslam_io::{prepare_folder, write_atomically};
-use yfslam_report::{Frames, MethodReport, Report, Times};
+use yfslam_report::{FigureFile, Frames, MethodReport, Report, Times};
 
-/// Writes all figures of the estimates into a folder, as SVG and PDF, and returns their number.
-///
-/// # Errors
-/// A file cannot be written.
-pub fn write_plots(
-    folder: &Path,
-    truth_file: &Path,
-    truth: &[StampedPose],
-    estimates: &[(&Path, &[StampedPose], &Evaluation)],
-) -> Result<usize> {
-    let names: Vec<String> = estimates.iter().map(|(path, ..)| name(path)).collect();
-    let methods = estimates.iter().zip(&names).map(|((_, trajectory, evaluation), name)| MethodReport {
+/// An evaluated trajectory in a figure.
+pub struct Plotted<'a> {
+    /// Name in the legend.
+    pub name: String,
+    pub trajectory: &'a [StampedPose],
+    pub evaluation: &'a Evaluation,
+}
+
+/// Returns the figures of estimates of one sequence.
+pub fn figures(sequence: &str, truth: &[StampedPose], estimates: &[Plotted<'_>]) -> Vec<FigureFile> {
+    let methods = estimates.iter().map(|Plotted { name, trajectory, evaluation }| MethodReport {
         name,
         summary: "",
         trajectory,
@@ -29,9 +28,8 @@ pub fn write_plots(
         dense: None,
         config: String::new(),
     });
-    let sequence = name(truth_file);
     let report = Report {
-        sequence: &sequence,
+        sequence,
         facts: Vec::new(),
         frames_ns: &[],
         truth: Some(truth),
@@ -42,17 +40,24 @@ pub fn write_plots(
         version: env!("CARGO_PKG_VERSION"),
         command: String::new(),
     };
-    prepare_folder(folder)?;
-    let figures = report.figures();
-    for figure in &figures {
-        write_atomically(&folder.join(format!("{}.svg", figure.name)), |file| file.write_all(figure.svg.as_bytes()))?;
-        write_atomically(&folder.join(format!("{}.pdf", figure.name)), |file| file.write_all(&figure.pdf))?;
-    }
-    Ok(figures.len())
+    report.figures()
 }
 
-/// Returns the name of a file, or of its folder where the name is that of every run.
-fn name(path: &Path) -> String {
+/// Writes figures into a folder, as SVG and PDF; `prefix` begins their names.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_figures(folder: &Path, prefix: &str, figures: &[FigureFile]) -> Result<()> {
+    prepare_folder(folder)?;
+    for FigureFile { name, svg, pdf, .. } in figures {
+        write_atomically(&folder.join(format!("{prefix}{name}.svg")), |file| file.write_all(svg.as_bytes()))?;
+        write_atomically(&folder.join(format!("{prefix}{name}.pdf")), |file| file.write_all(pdf))?;
+    }
+    Ok(())
+}
+
+/// Returns the name of a trajectory: that of its file, or of its folder where the file has the name that every run gives.
+pub fn name_of(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let folder = path.parent().and_then(Path::file_name).map(|folder| folder.to_string_lossy().into_owned());
     folder.filter(|_| stem == "trajectory").unwrap_or(stem)

@@ -112,12 +112,17 @@ pub fn scale_warning(evaluation: &Evaluation, source: ScaleSource) -> Option<Str
     let cause = match source {
         ScaleSource::DepthFactor(factor) => {
             let wanted = factor / scale;
-            let common = FACTORS.into_iter().find(|common| (common / wanted - 1.0).abs() < 0.08);
-            match common.filter(|common| (common / factor - 1.0).abs() > 0.05) {
-                Some(common) => {
-                    format!("the depth factor {factor} is probably wrong: --depth-factor {common} would fit")
-                }
-                None => format!("check the depth factor {factor} (about {wanted:.0} would fit) and the focal length"),
+            // A scale that was estimated over a short path is uncertain by some tenths.
+            let is_near = |common: &f64| (common / wanted - 1.0).abs() < 0.25 && (common / factor - 1.0).abs() > 0.05;
+            let mut common: Vec<f64> = FACTORS.into_iter().filter(is_near).collect();
+            common.sort_by(|a, b| (a / wanted - 1.0).abs().total_cmp(&(b / wanted - 1.0).abs()));
+            let common: Vec<String> = common.iter().map(f64::to_string).collect();
+            match &common[..] {
+                [] => format!("check the depth factor {factor} (about {wanted:.0} would fit) and the focal length"),
+                _ => format!(
+                    "the depth factor {factor} is probably wrong: about {wanted:.0} would fit; try --depth-factor {}",
+                    common.join(" or ")
+                ),
             }
         }
         ScaleSource::Baseline(baseline_m) => {
@@ -153,7 +158,7 @@ mod tests {
             scale_warning(&evaluate(&truth, &estimate, &options).unwrap(), source)
         };
         let text = warning(5.0, ScaleSource::DepthFactor(1000.0)).unwrap();
-        assert!(text.contains("5.00 times too long") && text.contains("--depth-factor 5000 would fit"), "{text}");
+        assert!(text.contains("5.00 times too long") && text.contains("try --depth-factor 5000"), "{text}");
         let text = warning(0.5, ScaleSource::Baseline(0.11)).unwrap();
         assert!(text.contains("2.00 times too short") && text.contains("0.2200 m would fit"), "{text}");
         assert!(warning(0.2, ScaleSource::Unknown).unwrap().contains("millimetres"));

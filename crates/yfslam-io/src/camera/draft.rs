@@ -66,9 +66,8 @@ impl Draft {
         } else {
             fy
         };
-        let mut camera = Camera::pinhole(width, height, fx, fy, cx, cy)
-            .with_distortion(self.lens.polynomial)
-            .with_rational_distortion(self.lens.rational);
+        let mut camera = Camera::pinhole(width, height, fx, fy, cx, cy).with_distortion(self.lens.polynomial);
+        camera.rational = self.lens.rational;
         camera.fps = self.fps.unwrap_or(camera.fps);
         camera.bf = self.bf.unwrap_or(camera.bf);
         let missing = Missing {

@@ -141,11 +141,11 @@ proptest! {
     fn a_check_of_arbitrary_values_never_panics(v in prop::array::uniform12(any::<f64>()), width in 0usize..70_000, height: usize) {
         let distortion = [v[4], v[5], v[6], v[7], v[8]];
         let rational = [v[11], v[4], v[3]];
-        let camera = Camera::pinhole(width, height, v[0], v[1], v[2], v[3])
+        let mut camera = Camera::pinhole(width, height, v[0], v[1], v[2], v[3])
             .with_distortion(distortion)
-            .with_rational_distortion(rational)
             .with_fps(v[10])
             .with_bf(v[11]);
+        camera.rational = rational;
         let _ = check_camera(&CameraSource::new(camera, v[9], "here"));
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod axis;
 pub mod bars;
+pub mod boxes;
 pub mod files;
 pub mod ink;
 mod orientation;

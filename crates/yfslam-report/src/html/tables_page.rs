@@ -1,5 +1,7 @@
 //! In: tables with their titles. Out: one HTML page in the style of the report of a run.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 
 use super::page::shell;
@@ -22,6 +24,8 @@ pub struct TablesPage<'a> {
     pub facts: Vec<(&'a str, String)>,
     /// The tables, in order.
     pub sections: &'a [TableSection],
+    /// Figures below the tables, each with a title and an SVG file.
+    pub figures: Vec<(String, String)>,
     /// Version of the program.
     pub version: &'a str,
     /// Command that produces this page again.
@@ -53,9 +57,27 @@ impl TablesPage<'_> {
                 }
             }
             @for section in self.sections { (show(section)) }
+            @if !self.figures.is_empty() {
+                section #figures {
+                    h2 { "Figures" }
+                    p.about { "Trajectories and errors with the first seed; errors over all seeds, with quartiles, extremes and a dot for each run." }
+                    div.pair { @for (title, svg) in &self.figures { (drawn(title, svg)) } }
+                }
+            }
             section #setup { h2 { "How to repeat it" } pre.command { (self.command) } }
         };
         shell(self.title, self.version, &content).into_string()
+    }
+}
+
+/// Returns a figure as an image of its own, with the colours of a light page.
+fn drawn(title: &str, svg: &str) -> Markup {
+    let source = format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg));
+    html! {
+        figure {
+            figcaption { b { (title) } }
+            img src=(source) alt=(title) style="background:#fff;width:100%";
+        }
     }
 }
 
@@ -113,6 +135,7 @@ mod tests {
             title: "x & y",
             facts: Vec::new(),
             sections: &[section],
+            figures: Vec::new(),
             version: "0",
             command: "yfslam bench".into(),
         };

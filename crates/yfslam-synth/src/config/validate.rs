@@ -43,7 +43,7 @@ impl WorldConfig {
         if self.stereo_m > 0.0 {
             let distortion = camera.distortion;
             check(
-                !camera.is_distorted(),
+                distortion == [0.0; 5] && camera.rational == [0.0; 3],
                 "camera.distortion",
                 format!("{distortion:?}"),
                 "zero for a stereo camera, whose images are rectified (such as --camera tum3)",

@@ -90,7 +90,7 @@ mod tests {
         let bytes = postcard::to_allocvec(&CameraRecord::of(&camera)).unwrap();
         let parts = ([640u32, 480], [535.4, 539.2, 320.1, 247.6], [0.1, -0.2, 0.001, 0.002, 0.0], 5000.0, 30.0, 40.0);
         assert_eq!(bytes, postcard::to_allocvec(&parts).unwrap());
-        for camera in [camera.clone(), camera.with_rational_distortion([0.3, 0.0, 0.02])] {
+        for camera in [camera.clone(), Camera { rational: [0.3, 0.0, 0.02], ..camera }] {
             // The record stands among others.
             let bytes = postcard::to_allocvec(&(CameraRecord::of(&camera), 7u64)).unwrap();
             let (record, next): (CameraRecord, u64) = postcard::from_bytes(&bytes).unwrap();

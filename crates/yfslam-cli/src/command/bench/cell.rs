@@ -45,7 +45,7 @@ impl Group {
 }
 
 /// The results of one method.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Name in the table.
     pub sequence: String,

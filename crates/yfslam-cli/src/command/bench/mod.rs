@@ -2,6 +2,8 @@
 
 mod benchmark_datasets;
 mod cell;
+mod external;
+mod figures;
 mod names;
 mod paper;
 mod runner;
@@ -17,10 +19,12 @@ use yfslam_io::{prepare_folder, write_atomically};
 use yfslam_report::{TableSection, TableStyle, TablesPage};
 
 use self::cell::{Cell, Group};
+use self::external::External;
+use self::figures::SequenceFigures;
 use self::names::distinct_names;
 use self::paper::sections;
 use self::runner::Bench;
-use self::table::csv;
+use self::table::{csv, summary_csv};
 use crate::output::folder::OutputFolder;
 use crate::ui::command_line::command_line;
 use crate::ui::failures::Failures;
@@ -35,13 +39,16 @@ Examples:
   yfslam bench rgbd_bonn_crowd --detector yolo-fastestv2.onnx --seeds 5 -- --camera bonn --grouping ransac
   yfslam bench walking_static --frames 150 -- --fault covered@2+1
   yfslam bench DIR                                       all sequences in a folder of folders
+  yfslam bench DIR --external ORB-SLAM3=results/orb      adds trajectories of another system
   yfslam bench --known DIR --methods none,yf,full        the dynamic sequences of TUM and Bonn in a folder
 
 Files in the output folder:
-  report.html  tables of the paper: errors with their improvement on none, times, frames tracked
+  report.html  tables of the paper: errors with their improvement on none, times, frames tracked; figures
   table.md     the same tables as Markdown
-  tables/      each table as CSV and as LaTeX
-  cells.csv    one line for each run
+  tables/      each table as CSV and as LaTeX (booktabs, the best figures bold)
+  cells.csv    one line for each run, one number in each cell
+  summary.csv  one line for each sequence and system: medians and ranges over the seeds
+  figures/     trajectories and errors of all systems with the first seed, and errors over the seeds, as SVG and PDF
   cells/       results of each run as JSON; existing ones are reused unless program or options have changed
   runs/        output folders of the runs
 
@@ -78,6 +85,10 @@ pub struct BenchArgs {
     /// Network that detects people: `embedded` or an ONNX file [default: the boxes of the sequence, else embedded].
     #[arg(long, value_name = "FILE.onnx|embedded")]
     detector: Option<PathBuf>,
+    /// Trajectories of another system: a file, or a folder with a file for each sequence, such as walking_xyz.txt, or walking_xyz_2.txt
+    /// for the second seed; can be given several times.
+    #[arg(long, value_name = "NAME=FILE|DIR")]
+    external: Vec<External>,
     /// Number of processes at the same time; each uses about as many cores as there are methods.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=256))]
     jobs: u16,
@@ -97,6 +108,7 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
         terminal.note(line);
     }
     let groups = args.groups(datasets.as_ref().map(|datasets| datasets.folders.as_slice()))?;
+    external::check(&args.external, &args.methods, &groups)?;
     let out = OutputFolder::prepare(args.out.as_deref(), "bench")?;
     ["cells", "tables"].iter().try_for_each(|part| prepare_folder(&out.path().join(part)))?;
     let program = std::env::current_exe().context("cannot find the file of this program")?;
@@ -118,14 +130,16 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
     if let Ok(progress) = progress.into_inner() {
         progress.finish();
     }
-    let cells = cells?;
+    let cells = external::with_externals(cells?, &groups, &args.external, &args.extra, terminal);
     for cell in cells.iter().filter(|cell| cell.failure.is_some()) {
         let failure = cell.failure.as_deref().unwrap_or_default();
         terminal.warn(&format!("{} with {}, seed {}: {failure}", cell.sequence, cell.method, cell.seed));
     }
     let sections = sections(&cells);
     let mut failures = Failures::new(terminal);
-    let page = write(out.path(), args, &cells, &sections, missing, &mut failures);
+    let drawn = figures::draw(out.path(), &groups, &cells, &args.external, &args.extra, terminal);
+    let drawn = failures.keep(drawn).unwrap_or_default();
+    let page = write(out.path(), args, &cells, &sections, &drawn, missing, &mut failures);
     let overview = sections.first().map_or(String::new(), |section| section.table.render(TableStyle::Markdown));
     let summary = format!("{overview}\nwritten to {}\nreport: {}\n", out.path().display(), page.display());
     let printed = terminal.result(&summary);
@@ -139,6 +153,7 @@ fn write(
     args: &BenchArgs,
     cells: &[Cell],
     sections: &[TableSection],
+    drawn: &[SequenceFigures],
     missing: &str,
     failures: &mut Failures,
 ) -> PathBuf {
@@ -166,9 +181,21 @@ fn write(
     facts.extend(missing.lines().map(|line| ("Not run", line.to_owned())));
     let version = env!("CARGO_PKG_VERSION");
     let title = "Comparison of methods";
-    let page = TablesPage { title, facts, sections, version, command: command_line() }.html();
+    // The page has trajectory and error over time; the other figures are in the folder.
+    let shown = ["trajectory-from-above", "trajectory-from-the-side", "translation-error", "ate-over-runs"];
+    let of_sequence = |one: &SequenceFigures| {
+        let chosen = one.figures.iter().filter(|figure| shown.contains(&figure.name.as_str()));
+        chosen.map(|figure| (format!("{}: {}", one.sequence, figure.title), figure.svg.clone())).collect::<Vec<_>>()
+    };
+    let figures = drawn.iter().flat_map(of_sequence).collect();
+    let page = TablesPage { title, facts, sections, figures, version, command: command_line() }.html();
     let path = out.join("report.html");
-    for (path, text) in [(&out.join("table.md"), &text), (&out.join("cells.csv"), &csv(cells)), (&path, &page)] {
+    for (path, text) in [
+        (&out.join("table.md"), &text),
+        (&out.join("cells.csv"), &csv(cells)),
+        (&out.join("summary.csv"), &summary_csv(cells)),
+        (&path, &page),
+    ] {
         failures.keep(write_atomically(path, |file| file.write_all(text.as_bytes())));
     }
     path

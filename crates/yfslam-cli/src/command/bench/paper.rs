@@ -7,7 +7,7 @@ use yfslam_eval::{Measure, Statistics, improvement_percent, published};
 use yfslam_report::{IMPROVEMENT, ORIGIN, PUBLISHED, Table, TableSection};
 
 use super::cell::Cell;
-use super::table::{Row, overview, rows, show};
+use super::table::{Row, overview, paired_table, rows, show};
 
 /// The method with which the others are compared; it corresponds to ORB-SLAM2 in the paper.
 const BASELINE: &str = "none";
@@ -65,7 +65,15 @@ pub fn sections(cells: &[Cell]) -> Vec<TableSection> {
     let about = "Median over the seeds, and the range. Lost frames have no error, so that an error is meaningful only together with the share of tracked frames.";
     let first = TableSection { id: "overview", title: "Overview".into(), about: about.into(), table: overview(&rows) };
     let errors = ERRORS.iter().map(|errors| errors.section(&rows));
-    [first].into_iter().chain(errors).chain([times(&rows), tracked(&rows)]).collect()
+    [first].into_iter().chain(errors).chain([compared(&rows), times(&rows), tracked(&rows)]).collect()
+}
+
+/// Returns the systems in pairs.
+fn compared(rows: &[Row]) -> TableSection {
+    let about = "Absolute trajectory errors of two systems on the same sequences and seeds. p is the probability of a difference at least as \
+                 clear if both were equally good: the signed-rank test of Wilcoxon, two-sided, exact up to 50 pairs. With n pairs it is \
+                 never below 2 / 2ⁿ: five pairs cannot reach 0.05.";
+    TableSection { id: "paired", title: "Systems in pairs".into(), about: about.into(), table: paired_table(rows) }
 }
 
 impl Errors {
@@ -88,6 +96,8 @@ impl Errors {
                 self.push_published(row.sequence, &mut table);
             }
         }
+        table.mark_smallest(2);
+        table.mark_smallest(3);
         let about = format!(
             "Medians over the seeds. Improvement on {BASELINE}: (1 − error / error of {BASELINE}) · 100 % (equation 3). Rows marked \
              {PUBLISHED} are results that papers report for the whole sequence, measured on other machines."

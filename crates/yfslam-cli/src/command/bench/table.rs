@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use yfslam_eval::Statistics;
-use yfslam_report::Table;
+use yfslam_eval::{Paired, Statistics, paired};
+use yfslam_report::{Table, TableStyle};
 
 use super::cell::Cell;
 
@@ -77,6 +77,83 @@ pub fn overview(rows: &[Row]) -> Table {
     table
 }
 
+/// A figure of a cell, if it is known.
+type Figure = fn(&Cell) -> Option<f64>;
+
+/// Returns one line for each sequence and method, with one number in each cell; unknown figures are empty.
+pub fn summary_csv(cells: &[Cell]) -> String {
+    let figures: [(&str, Figure); 5] = [
+        ("ate_rmse_m", |c| c.ate_rmse_m),
+        ("tracked", |c| c.tracked),
+        ("rpe_frame_m", |c| c.rpe_frame_m),
+        ("rpe_second_m", |c| c.rpe_second_m),
+        ("rpe_second_deg", |c| c.rpe_second_deg),
+    ];
+    let of_each = ["median", "mean", "std", "min", "max"];
+    let mut headers = vec!["sequence".to_owned(), "method".into(), "runs".into(), "failed".into()];
+    headers.extend(figures.iter().flat_map(|(name, _)| of_each.map(|statistic| format!("{name}_{statistic}"))));
+    let mut table = Table::new(headers);
+    for row in rows(cells) {
+        let mut line = vec![
+            row.sequence.to_owned(),
+            row.method.to_owned(),
+            row.cells.len().to_string(),
+            row.failures().to_string(),
+        ];
+        for (_, figure) in figures {
+            let statistics = row.over(figure);
+            let values = statistics.map(|s| [s.median, s.mean, s.std, s.min, s.max]);
+            line.extend(values.map_or_else(|| of_each.map(|_| String::new()), |values| values.map(|v| v.to_string())));
+        }
+        table.push(line);
+    }
+    table.render(TableStyle::Csv)
+}
+
+/// Returns the systems in pairs, compared on the runs that both have.
+pub fn paired_table(rows: &[Row]) -> Table {
+    let mut methods: Vec<&str> = Vec::new();
+    for row in rows {
+        if !methods.contains(&row.method) {
+            methods.push(row.method);
+        }
+    }
+    let mut table = Table::new([
+        "first system",
+        "second system",
+        "pairs of runs",
+        "first better",
+        "second better",
+        "ATE first / second, median",
+        "p (Wilcoxon)",
+    ]);
+    for (index, second) in methods.iter().enumerate() {
+        for first in methods.iter().skip(index + 1) {
+            let Some(result) = paired(&pairs(rows, first, second)) else { continue };
+            let Paired { pairs, wins, losses, median_ratio, p } = result;
+            let counts = [pairs, wins, losses].map(|count| count.to_string());
+            let ratio = median_ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.3}"));
+            table.push(
+                [(*first).to_owned(), (*second).to_owned()].into_iter().chain(counts).chain([ratio, format!("{p:.4}")]),
+            );
+        }
+    }
+    table
+}
+
+/// Returns the errors of two systems on the same sequences and seeds.
+fn pairs(rows: &[Row], first: &str, second: &str) -> Vec<(f64, f64)> {
+    let of = |method: &str| {
+        rows.iter().filter(|row| row.method == method).flat_map(|row| &row.cells).copied().collect::<Vec<&Cell>>()
+    };
+    let others = of(second);
+    let pair = |cell: &&Cell| {
+        let other = others.iter().find(|other| (&other.sequence, other.seed) == (&cell.sequence, cell.seed))?;
+        cell.ate_rmse_m.zip(other.ate_rmse_m)
+    };
+    of(first).iter().filter_map(pair).collect()
+}
+
 /// Returns one line for each cell; unknown figures are empty.
 pub fn csv(cells: &[Cell]) -> String {
     let mut text =
@@ -97,17 +174,16 @@ pub fn csv(cells: &[Cell]) -> String {
         ];
         let figures = figures.map(|figure| figure.map_or(String::new(), |value| value.to_string())).join(",");
         let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+        let plain = |text: &str| if text.contains([',', '"']) { quoted(text) } else { text.to_owned() };
         let failure = cell.failure.as_deref().map_or(String::new(), quoted);
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{},{},{},{figures},{failure}", quoted(&cell.sequence), cell.method, cell.seed);
+        let _ = writeln!(text, "{},{},{},{figures},{failure}", quoted(&cell.sequence), plain(&cell.method), cell.seed);
     }
     text
 }
 
 #[cfg(test)]
 pub mod tests {
-    use yfslam_report::TableStyle;
-
     use super::*;
 
     /// A cell for tests; most figures have the same value.
@@ -154,5 +230,25 @@ pub mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[1], "\"walk, \"\"fast\"\"\",yf,3,,,,,,,,,20,\"no trajectory\"");
         assert_eq!(lines[2], "\"walk, \"\"fast\"\"\",yf,1,0.25,0.125,0.5,0.25,,,0.25,0.25,20,");
+    }
+
+    #[test]
+    fn pairs_are_of_the_same_sequence_and_seed_and_a_summary_has_one_number_a_cell() {
+        let mut cells = Vec::new();
+        for seed in 1..=4 {
+            cells.push(cell("a", "none", seed, Some(0.2 + 0.01 * seed as f64)));
+            cells.push(cell("a", "yf", seed, Some(0.1)));
+        }
+        cells.push(cell("a", "ORB", 1, Some(0.3)));
+        let rows = rows(&cells);
+        let table = paired_table(&rows);
+        let found: Vec<Vec<&str>> =
+            table.rows().iter().skip(1).map(|row| row.iter().map(String::as_str).collect()).collect();
+        assert_eq!(found[0], ["yf", "none", "4", "4", "0", "0.445", "0.1250"]);
+        assert_eq!(found[1][..5], ["ORB", "none", "1", "0", "1"]);
+        let text = summary_csv(&cells);
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].starts_with("sequence,method,runs,failed,ate_rmse_m_median,ate_rmse_m_mean"));
+        assert!(lines[3].starts_with("a,ORB,1,0,0.3,0.3,0,0.3,0.3,") && lines.len() == 4, "{text}");
     }
 }

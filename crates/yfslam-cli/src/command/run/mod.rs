@@ -11,6 +11,7 @@ use anyhow::{Context, Result, ensure};
 use clap::{Args, Command, FromArgMatches};
 use yfslam::config::DepthSource;
 use yfslam::{Config, Method};
+use yfslam_eval::{EvalOptions, ExpectedFrames};
 use yfslam_report::{TableStyle, evaluation_table};
 
 use self::checkpoint::Checkpoints;
@@ -240,6 +241,23 @@ impl RunArgs {
     pub fn parse(arguments: &[OsString]) -> Result<Self> {
         let command = Self::augment_args(Command::new("yfslam run").no_binary_name(true));
         Ok(Self::from_arg_matches(&command.try_get_matches_from(arguments)?)?)
+    }
+
+    /// Returns what an estimate of another program is evaluated with: the time stamps of all frames, the ground truth, and the options.
+    ///
+    /// # Errors
+    /// The sequence cannot be opened, or has no ground truth.
+    pub fn reference(&self, terminal: Terminal) -> Result<(Vec<i64>, Truth, EvalOptions)> {
+        let source = Source::open(&self.source, self.settings.resolve()?.depth.source, None)?;
+        let truth = source.truth(self.groundtruth.as_deref(), terminal)?;
+        let truth = truth.with_context(|| format!("{} has no ground truth", source.name))?;
+        let options = EvalOptions {
+            max_diff_ns: self.evaluation.max_diff_ns()?,
+            alignment: self.evaluation.alignment(source.depth_source != DepthSource::Motion),
+            expected: ExpectedFrames::StampsNs(source.stamps_ns.clone()),
+            ..EvalOptions::default()
+        };
+        Ok((source.stamps_ns, truth, options))
     }
 
     /// Checks before a run that its map can be saved after it, in a file of its own.

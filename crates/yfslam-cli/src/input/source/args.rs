@@ -45,7 +45,7 @@ pub struct SourceArgs {
     /// Frames per second of images without time stamps [default: 30].
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub fps: Option<f64>,
-    /// Camera: tum1, tum2, tum3, bonn, or a settings file in TOML or ORB-SLAM's YAML [default: the camera file in the folder].
+    /// Camera: a preset such as tum1, bonn or d435i, or a camera file of any common kind [default: the camera file in the folder].
     #[arg(long, value_name = "PRESET|FILE")]
     pub camera: Option<String>,
     /// Type of the camera [default: what the sequence has].

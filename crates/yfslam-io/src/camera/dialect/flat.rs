@@ -1,7 +1,7 @@
 //! Files with `fx`, `fy`, `cx`, `cy` under plain names, alone or below one key: the configurations of many reconstruction programs
 //! (`cam: {H: 680, W: 1200, fx: 600.0, png_depth_scale: 6553.5}`), and `cam_params.json` of Replica.
 
-use super::super::draft::{Draft, Lens};
+use super::super::draft::{Draft, Lens, refuse_model};
 use super::super::settings::Settings;
 use crate::error::Result;
 
@@ -20,6 +20,8 @@ fn parent(settings: &Settings) -> Option<&'static str> {
 pub fn read(settings: &mut Settings) -> Result<Draft> {
     let parent = parent(settings).unwrap_or_default();
     let names = |names: &[&str]| names.iter().map(|name| format!("{parent}{name}")).collect::<Vec<_>>();
+    let known = ["pinhole", "simplepinhole", "perspective", "opencv", "fullopencv", "radial", "simpleradial"];
+    refuse_model(settings, &refs(&names(&["camera_model", "model"])), &known)?;
     let required = |settings: &mut Settings, aliases: &[&str]| settings.required(&refs(&names(aliases)));
     let mut draft = Draft::new([
         required(settings, &["fx", "fl_x"])?,

@@ -74,6 +74,10 @@ pub fn read(text: &str, path: &Path) -> Result<CameraSource> {
         let (kind, draft) = plain::read(text, path)?;
         return Ok(draft.into_source(kind, None, origin()));
     }
+    if plain::is_numbers(first) {
+        let cure = "write 'fx fy cx cy' in px on one line; files of DSO and LSD-SLAM have values relative to the size of the images";
+        return Err(Error::content(path, format!("begins with numbers that are no camera: '{first}'"), cure));
+    }
     let mut settings = if begin.starts_with('{') { json::parse(text, path)? } else { yaml::parse(text, path)? };
     let Some(dialect) = DIALECTS.iter().find(|dialect| (dialect.recognises)(&settings)) else {
         return Err(unknown(&settings));

@@ -55,7 +55,7 @@ pub fn read(settings: &mut Settings) -> Result<Draft> {
             "{key} says that the images have to be rectified, and the calibration is that of the rectified images"
         );
         draft.notes.push(format!("{problem}; images of a single camera must be rectified, too"));
-        draft.stereo_problem = Some(problem);
+        draft.stereo_problem = Some(format!("{problem}; remove these keys if that has been done"));
         return Ok(draft);
     }
     if !settings.has("Camera2.fx") {

@@ -48,9 +48,9 @@ pub fn parse_toml(text: &str, path: &Path) -> Result<CameraSource> {
         _ => return Err(Error::content(path, "one of width and height is missing", "give both or none of them")),
     };
     let [width, height] = size.unwrap_or_default();
-    let mut camera = Camera::pinhole(width, height, keys.fx, keys.fy, keys.cx, keys.cy)
-        .with_distortion(keys.distortion)
-        .with_rational_distortion(keys.rational);
+    let mut camera =
+        Camera::pinhole(width, height, keys.fx, keys.fy, keys.cx, keys.cy).with_distortion(keys.distortion);
+    camera.rational = keys.rational;
     camera.fps = keys.fps.unwrap_or(camera.fps);
     camera.bf = keys.bf.unwrap_or(camera.bf);
     camera.readout_ms = keys.readout_ms;

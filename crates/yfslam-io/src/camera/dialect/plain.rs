@@ -10,10 +10,16 @@ use crate::text::content_lines;
 /// More lines are no camera.
 const MAX_LINES: usize = 8;
 
+/// Returns whether all lines consist of numbers.
 pub fn recognises(text: &str) -> bool {
     let mut lines = content_lines(text).take(MAX_LINES).peekable();
-    let is_number = |word: &str| word.parse::<f64>().is_ok();
-    lines.peek().is_some() && lines.all(|(_, line)| words(line).all(is_number))
+    lines.peek().is_some() && lines.all(|(_, line)| is_numbers(line))
+}
+
+/// Returns whether a line consists of numbers.
+pub fn is_numbers(line: &str) -> bool {
+    let mut words = words(line).peekable();
+    words.peek().is_some() && words.all(|word| word.parse::<f64>().is_ok())
 }
 
 fn words(line: &str) -> impl Iterator<Item = &str> {
