@@ -23,8 +23,8 @@ impl DepthResampling {
             let [u, v] = depth.distort(x, y);
             let (u, v) = (u.round(), v.round());
             let is_inside = u >= 0.0 && v >= 0.0 && u < depth.width as f64 && v < depth.height as f64;
-            let pixel = v as usize * depth.width + u as usize;
-            u32::try_from(pixel).ok().filter(|_| is_inside).unwrap_or(u32::MAX)
+            let pixel = is_inside.then(|| v as usize * depth.width + u as usize);
+            pixel.and_then(|pixel| u32::try_from(pixel).ok()).unwrap_or(u32::MAX)
         };
         let sources = (0..color.width.saturating_mul(color.height)).map(source).collect();
         Self { from: [depth.width, depth.height], width: color.width, height: color.height, sources }

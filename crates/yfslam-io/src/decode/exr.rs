@@ -6,7 +6,10 @@ use exr::meta::MetaData;
 use exr::prelude::*;
 
 use super::depth_values::DepthValues;
-use super::{DEPTH_KIND_CURE, DEPTH_SIZE_CURE, DecodeError, ImageSize, check_size};
+use super::{DEPTH_KIND_CURE, DEPTH_SIZE_CURE, DecodeError, ImageSize, MAX_PIXELS, check_size};
+
+/// Most values of all channels that are decoded; it bounds the memory that a forged header can request.
+const MAX_SAMPLES: usize = 4 * MAX_PIXELS;
 
 /// Returns the depth values of an image.
 pub fn decode_depth(bytes: &[u8], expected: Option<ImageSize>) -> std::result::Result<DepthValues, DecodeError> {
@@ -14,7 +17,12 @@ pub fn decode_depth(bytes: &[u8], expected: Option<ImageSize>) -> std::result::R
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     for header in &meta.headers {
         let size = header.layer_size;
-        check_size(ImageSize { width: size.width(), height: size.height() }, expected, DEPTH_SIZE_CURE)?;
+        let size = ImageSize { width: size.width(), height: size.height() };
+        check_size(size, expected, DEPTH_SIZE_CURE)?;
+        // Every channel is decoded.
+        if header.channels.list.len().saturating_mul(size.width * size.height) > MAX_SAMPLES {
+            return Err(DecodeError::TooLarge(size));
+        }
     }
     let read = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let image = read.non_parallel().from_buffered(Cursor::new(bytes)).map_err(damaged)?;

@@ -27,8 +27,9 @@ pub fn decode_depth(
     let kind = entry("descr")?.trim_start_matches('\'').split('\'').next().unwrap_or_default();
     let pixels = size.width * size.height;
     let width: usize = kind.get(2..).and_then(|width| width.parse().ok()).unwrap_or(0);
-    if data.len() < pixels.saturating_mul(width) {
-        return Err(DecodeError::Damaged(format!("it has {} of {} bytes of pixels", data.len(), pixels * width)));
+    let needed = pixels.saturating_mul(width);
+    if data.len() < needed {
+        return Err(DecodeError::Damaged(format!("it has {} of {needed} bytes of pixels", data.len())));
     }
     let is_big = kind.starts_with('>');
     let floats = |values: Vec<f32>| Ok(Some(DepthValues { size, values }));
