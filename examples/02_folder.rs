@@ -13,7 +13,9 @@ use yfslam::{Config, Slam};
 use yfslam_detect::{DetectorConfig, YoloFastestV2};
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
 use yfslam_io::write::{ListedStamps, RecordingWriter};
-use yfslam_io::{FrameStream, Sequence, SequenceOptions, StampedPose, complete_camera, detect_camera, load_camera, write_trajectory};
+use yfslam_io::{
+    FrameStream, Sequence, SequenceOptions, StampedPose, complete_camera, detect_camera, load_camera, write_trajectory,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);

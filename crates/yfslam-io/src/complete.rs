@@ -1,10 +1,9 @@
 //! Fills in what a camera file does not say from the recording to which it belongs.
 
 use crate::camera::CameraSource;
-use crate::decode::decode_color;
 use crate::error::{Error, Result};
 use crate::sequence::Sequence;
-use crate::text::read_bytes;
+use crate::stream::open_color;
 
 /// Fills in the size of the images where the camera file has none, from the first readable colour image of a sequence of files, and
 /// refuses what is missing still.
@@ -21,12 +20,8 @@ const SIZE_ATTEMPTS: usize = 30;
 fn first_image_size(sequence: &Sequence) -> Result<[usize; 2]> {
     let (mut bytes, mut image, mut first_error) = (Vec::new(), yfslam::RgbImage::default(), None);
     for entry in sequence.entries.iter().take(SIZE_ATTEMPTS) {
-        let path = &entry.color_path;
-        let read = read_bytes(path, &mut bytes).map_err(|source| Error::read(path, source));
-        let decoded = read.and_then(|()| {
-            decode_color(&bytes, None, &mut image).map_err(|error| {
-                Error::content(path, error.to_string(), "give the size of the images in the camera file")
-            })
+        let decoded = open_color(&entry.color, None, &mut bytes, &mut image).map_err(|fault| {
+            Error::content(&sequence.folder, fault.to_string(), "give the size of the images in the camera file")
         });
         match decoded {
             Ok(_) => return Ok([image.width(), image.height()]),

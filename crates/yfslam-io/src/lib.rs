@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! folder ──Sequence──► entries ──FrameStream──► Frame, or a FrameError for a frame that cannot be used
-//!   TUM, EuRoC, KITTI              decoded, stereo pairs rectified
+//!   TUM, EuRoC, ScanNet, …         decoded, stereo pairs rectified
 //! preset or camera file of any dialect ──load_camera──► Camera ──complete_camera──► with the size of the images
 //! frames ──FaultInjector──► frames as a faulty camera sends them ──RecordingWriter──► folder, with its BoxList
 //! trajectory file ◄──► TrajectoryFile        points, images, text ──write_atomically──► files
@@ -31,13 +31,16 @@
 //! ```
 
 mod atomic_file;
+pub mod bag;
 pub mod boxes;
 pub mod camera;
 mod complete;
 pub mod decode;
 pub mod depth;
+mod depth_resampling;
 pub mod error;
 pub mod faults;
+pub mod message;
 pub mod rectify;
 pub mod sequence;
 pub mod stream;
@@ -48,10 +51,12 @@ pub mod trajectory;
 pub mod write;
 
 pub use atomic_file::{prepare_folder, write_atomically};
+pub use bag::Bag;
 pub use boxes::BoxList;
 pub use camera::{CameraSource, detect_camera, load_camera};
 pub use complete::complete_camera;
 pub use depth::{DepthStatistics, check_recording};
+pub use depth_resampling::DepthResampling;
 pub use error::{Error, Result};
 pub use faults::{Delivery, Fault, FaultInjector, FaultKind};
 pub use sequence::{Sequence, SequenceOptions};

@@ -8,12 +8,15 @@ use std::path::Path;
 
 use common::{real_data, write_sequence};
 use proptest::prelude::*;
-use yfslam_io::sequence::FrameEntry;
-use yfslam_io::sequence::lists::ListedFile;
+use yfslam_io::sequence::{FrameEntry, ImageRef};
 use yfslam_io::{Sequence, SequenceOptions};
 
-fn depth(entry: &FrameEntry) -> &ListedFile {
-    entry.paired_image.as_ref().unwrap()
+fn depth_ns(entry: &FrameEntry) -> i64 {
+    entry.paired_image.as_ref().unwrap().stamp_ns
+}
+
+fn ends_with(image: &ImageRef, name: &str) -> bool {
+    image.file().unwrap().ends_with(name)
 }
 
 fn refusal(folder: &Path) -> String {
@@ -27,8 +30,8 @@ fn a_tum_folder_is_paired_by_time() {
     let sequence = Sequence::open(folder.path(), &SequenceOptions::default()).unwrap();
     assert_eq!((sequence.entries.len(), sequence.report.paired, sequence.report.color_unmatched), (12, 12, 0));
     let entry = &sequence.entries[11];
-    assert_eq!((entry.timestamp_ns, depth(entry).stamp_ns), (101_100_000_000, 101_105_000_000));
-    assert_eq!(entry.color_path, folder.path().join("rgb/11.png"));
+    assert_eq!((entry.timestamp_ns, depth_ns(entry)), (101_100_000_000, 101_105_000_000));
+    assert_eq!(entry.color.file(), Some(folder.path().join("rgb/11.png").as_path()));
     let strict = SequenceOptions { association_tolerance_ns: 4_000_000, ..Default::default() };
     let error = Sequence::open(folder.path(), &strict).unwrap_err().to_string();
     assert!(
@@ -66,8 +69,9 @@ fn the_pairs_of_an_associations_file_are_used_in_either_order_of_columns() {
         let sequence = Sequence::open(folder.path(), &SequenceOptions::default()).unwrap();
         assert!(sequence.report.from_associations_file);
         let first = &sequence.entries[0];
-        assert_eq!((first.timestamp_ns, depth(first).stamp_ns), (100_000_000_000, 100_900_000_000));
-        assert!(first.color_path.ends_with("rgb/0.png") && depth(first).path.ends_with("depth/0.png"));
+        assert_eq!((first.timestamp_ns, depth_ns(first)), (100_000_000_000, 100_900_000_000));
+        let depth = &first.paired_image.as_ref().unwrap().image;
+        assert!(ends_with(&first.color, "rgb/0.png") && ends_with(depth, "depth/0.png"));
     }
     fs::write(folder.path().join("associations.txt"), "1 rgb/0.png 1 depth/0.png\n2 rgb/1.png 2 depth/0.png\n")
         .unwrap();
@@ -83,10 +87,8 @@ fn a_part_is_cut_out_and_played_backward_with_ascending_stamps() {
     let sequence = Sequence::open(folder.path(), &options).unwrap();
     let stamps: Vec<i64> = sequence.entries.iter().map(|e| e.timestamp_ns / 1_000_000).collect();
     assert_eq!(stamps, [100_200, 100_300, 100_400, 100_500]);
-    assert!(
-        sequence.entries[0].color_path.ends_with("rgb/5.png") && sequence.entries[3].color_path.ends_with("rgb/2.png")
-    );
-    assert_eq!(depth(&sequence.entries[0]).stamp_ns, 100_195_000_000);
+    assert!(ends_with(&sequence.entries[0].color, "rgb/5.png") && ends_with(&sequence.entries[3].color, "rgb/2.png"));
+    assert_eq!(depth_ns(&sequence.entries[0]), 100_195_000_000);
     let mirror = sequence.mirror.unwrap();
     assert_eq!((mirror.first_ns, mirror.last_ns), (100_200_000_000, 100_500_000_000));
 
@@ -116,7 +118,11 @@ fn folders_without_a_sequence_are_refused_with_a_cure() {
     fs::write(&archive, "x").unwrap();
     assert!(refusal(&archive).contains("is a file, not a folder; unpack"));
     fs::write(path.join("rgb.txt"), "").unwrap();
-    assert!(refusal(path).contains("holds no depth.txt and no associations.txt"));
+    let text = refusal(path);
+    assert!(
+        text.contains("no list of depth or right images (depth.txt, right.txt)") && text.contains("--sensor mono"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -171,7 +177,7 @@ fn association_of_the_development_recordings_equals_their_published_pairs() {
             std::os::unix::fs::symlink(folder.join(images), lists.path().join(images)).unwrap();
         }
         let ours = Sequence::open(lists.path(), &SequenceOptions::default()).unwrap();
-        let stamps = |s: &Sequence| s.entries.iter().map(|e| (e.timestamp_ns, depth(e).stamp_ns)).collect::<Vec<_>>();
+        let stamps = |s: &Sequence| s.entries.iter().map(|e| (e.timestamp_ns, depth_ns(e))).collect::<Vec<_>>();
         assert_eq!(stamps(&ours), stamps(&published), "{name}");
     }
 }

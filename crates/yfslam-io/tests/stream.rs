@@ -41,7 +41,7 @@ fn bad_frames_are_values_that_name_file_and_cure_and_the_others_arrive() {
     write_sequence(path, 10);
     fs::remove_file(path.join("rgb/0.png")).unwrap();
     fs::write(path.join("rgb/1.png"), &color_png(SIZE, 9)[..60]).unwrap();
-    fs::write(path.join("rgb/2.png"), depth_png(SIZE, 1)).unwrap();
+    fs::write(path.join("rgb/2.png"), "RIFF....WEBP").unwrap();
     fs::write(path.join("rgb/3.png"), color_png((4, 4), 9)).unwrap();
     fs::write(path.join("depth/4.png"), color_png(SIZE, 9)).unwrap();
     fs::write(path.join("depth/5.png"), depth_png((4, 3), 9)).unwrap();
@@ -52,7 +52,7 @@ fn bad_frames_are_values_that_name_file_and_cure_and_the_others_arrive() {
     let expected = [
         (0, "rgb/0.png: ", "check the path"),
         (1, "rgb/1.png is damaged", "record or unpack"),
-        (2, "rgb/2.png is a PNG of 16-bit grey", "8-bit"),
+        (2, "rgb/2.png is a WebP image", "convert it to PNG"),
         (3, "rgb/3.png has 4×4 pixels, but the camera has 8×6", "camera file"),
         (4, "depth/4.png is a PNG of 8-bit RGB", "16-bit grey PNG"),
         (5, "depth/5.png has 4×3 pixels, but the camera has 8×6", "register"),

@@ -47,7 +47,7 @@ pub enum Command {
     Bench(bench::BenchArgs),
     Calibrate(Box<calibrate::CalibrateArgs>),
     Camera(camera::CameraArgs),
-    Info(info::InfoArgs),
+    Info(Box<info::InfoArgs>),
     Config(config::ConfigArgs),
     Completions(completions::CompletionsArgs),
 }

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use yfslam::{Detection, Detector, RgbImage, RollCompensation};
 use yfslam_detect::DetectorConfig;
-use yfslam_io::decode::decode_color;
+use yfslam_io::decode::decode_photo;
 use yfslam_io::write::write_color_png;
 use yfslam_io::{prepare_folder, read_file};
 
@@ -197,8 +197,8 @@ fn detect(
     roll_deg: i32,
 ) -> Result<(RgbImage, Vec<Detection>)> {
     let bytes = read_file(file).with_context(|| format!("{} cannot be read", file.display()))?;
-    let (mut image, mut found) = (RgbImage::default(), Vec::new());
-    decode_color(&bytes, None, &mut image).map_err(|error| anyhow!("{} {error}", file.display()))?;
+    let mut found = Vec::new();
+    let image = decode_photo(&bytes).map_err(|error| anyhow!("{} {error}", file.display()))?;
     upright.detect(detector, &image, roll_deg, &mut found).with_context(|| file.display().to_string())?;
     Ok((image, found))
 }

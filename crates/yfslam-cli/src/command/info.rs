@@ -6,14 +6,15 @@ use std::path::Path;
 use anyhow::Result;
 use clap::Args;
 use yfslam::config::DepthSource;
-use yfslam::{Image, RgbImage};
-use yfslam_io::decode::{decode_color, decode_depth};
+use yfslam::{DepthImage, RgbImage};
+use yfslam_io::bag::is_bag;
 use yfslam_io::depth::check_depth_factor;
 use yfslam_io::sequence::{AssociationReport, FrameEntry, Layout};
+use yfslam_io::stream::{open_color, open_depth};
 use yfslam_io::time::{format_stamp, seconds};
 use yfslam_io::{CameraSource, DepthStatistics, Sequence};
 
-use crate::input::source::{SourceArgs, open_sequence, world_camera};
+use crate::input::source::{SourceArgs, describe_bag, open_sequence, world_camera};
 use crate::ui::terminal::{explain, print};
 
 /// Number of frames that are opened, spread evenly over the sequence.
@@ -38,10 +39,20 @@ pub fn run(args: &InfoArgs) -> Result<()> {
 }
 
 fn recorded(args: &SourceArgs) -> Result<String> {
-    let (sequence, camera) = open_sequence(args, DepthSource::Image)?;
-    let mut text = String::new();
-    writeln!(text, "{}", sequence.folder.display())?;
+    let topics = if is_bag(args.folder()) { describe_bag(args.folder())? } else { String::new() };
+    let mut text = format!("{}\n{topics}", args.folder().display());
+    let (sequence, camera) = match open_sequence(args, DepthSource::Image) {
+        Err(error) if !topics.is_empty() => {
+            writeln!(text, "frames        none: {}", explain(&error))?;
+            return Ok(text);
+        }
+        opened => opened?,
+    };
     writeln!(text, "kind          {}, {}", sequence.layout.name(), sensor(sequence.depth_source))?;
+    writeln!(text, "              recognised: {}", sequence.because)?;
+    for note in &sequence.notes {
+        writeln!(text, "              {note}")?;
+    }
     lists(&mut text, &sequence)?;
     timing(&mut text, &sequence)?;
     images(&mut text, &sequence, camera.as_ref().ok())?;
@@ -83,6 +94,9 @@ fn lists(text: &mut String, sequence: &Sequence) -> Result<()> {
                 text,
                 "lists         rgb.txt {color_listed}, depth.txt {paired_images_listed} images; {paired} pairs"
             )?;
+        }
+        (_, DepthSource::Image) => {
+            writeln!(text, "images        {color_listed} colour, {paired_images_listed} depth images; {paired} pairs")?;
         }
         _ => writeln!(text, "lists         {color_listed} left, {paired_images_listed} right images; {paired} pairs")?,
     }
@@ -126,14 +140,16 @@ fn timing(text: &mut String, sequence: &Sequence) -> Result<()> {
 
 /// Describes sizes and depths of some images, independent of the camera.
 fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>) -> Result<()> {
+    // Without a camera, depth units are unknown and values are raw.
+    let (factor, unit) = camera.map_or((1.0, "raw"), |source| (source.depth_factor, "m"));
     let step = sequence.entries.len().div_ceil(SAMPLES).max(1);
     let (mut sizes, mut depths, mut faults) = (Vec::new(), Vec::new(), Vec::new());
     let samples = sequence.entries.iter().step_by(step);
     let opened = samples.len();
     for entry in samples {
-        match open_images(entry, sequence.depth_source) {
+        match open_images(entry, sequence.depth_source, factor) {
             Ok((color, depth)) => {
-                let of_depth = depth.as_ref().map(|depth| [depth.width(), depth.height()]);
+                let of_depth = depth.as_ref().map(|depth| [depth.raw.width(), depth.raw.height()]);
                 sizes.push(([color.width(), color.height()], of_depth));
                 depths.extend(depth);
             }
@@ -149,9 +165,7 @@ fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>)
     if let Some(first) = faults.first() {
         writeln!(text, "              {} of {opened} opened frames are unusable; the first: {first:#}", faults.len())?;
     }
-    // Without a camera, depth units are unknown and values are raw.
-    let (factor, unit) = camera.map_or((1.0, "raw"), |source| (source.depth_factor, "m"));
-    let Some(d) = DepthStatistics::of(&depths, factor) else { return Ok(()) };
+    let Some(d) = DepthStatistics::of(&depths) else { return Ok(()) };
     writeln!(
         text,
         "depth         median {:.3} {unit}, 5 to 95 % in {:.3} to {:.3} {unit}; {:.1} % of pixels measured ({} frames)",
@@ -161,25 +175,29 @@ fn images(text: &mut String, sequence: &Sequence, camera: Option<&CameraSource>)
         100.0 * d.valid_share,
         depths.len()
     )?;
-    if let (Some(_), Err(error)) = (camera, check_depth_factor(&depths, factor)) {
-        writeln!(text, "              implausible: {error}")?;
+    match check_depth_factor(&depths, factor) {
+        _ if camera.is_none() => {}
+        Err(error) => writeln!(text, "              implausible: {error}")?,
+        Ok(depths) => {
+            if let Some(warning) = depths.warning(factor) {
+                writeln!(text, "              {warning}")?;
+            }
+        }
     }
     Ok(())
 }
 
 /// Opens the colour image, and the depth or right image; returns the colour and the depth image.
-fn open_images(entry: &FrameEntry, depth_source: DepthSource) -> Result<(RgbImage, Option<Image<u16>>)> {
-    let (mut color, mut depth, mut right) = (RgbImage::default(), Image::default(), RgbImage::default());
-    let read = |path: &Path| std::fs::read(path).map_err(|error| anyhow::anyhow!("{}: {error}", path.display()));
-    let fault = |path: &Path, error| anyhow::anyhow!("{} {error}", path.display());
-    decode_color(&read(&entry.color_path)?, None, &mut color).map_err(|e| fault(&entry.color_path, e))?;
+fn open_images(entry: &FrameEntry, depth_source: DepthSource, factor: f64) -> Result<(RgbImage, Option<DepthImage>)> {
+    let (mut color, mut depth, mut right) = (RgbImage::default(), DepthImage::default(), RgbImage::default());
+    let mut bytes = Vec::new();
+    open_color(&entry.color, None, &mut bytes, &mut color)?;
     let Some(paired) = &entry.paired_image else { return Ok((color, None)) };
-    let bytes = read(&paired.path)?;
     if depth_source == DepthSource::Image {
-        decode_depth(&bytes, None, &mut depth).map_err(|e| fault(&paired.path, e))?;
+        open_depth(&paired.image, None, factor, &mut bytes, &mut depth)?;
         return Ok((color, Some(depth)));
     }
-    decode_color(&bytes, None, &mut right).map_err(|e| fault(&paired.path, e))?;
+    open_color(&paired.image, None, &mut bytes, &mut right)?;
     Ok((color, None))
 }
 

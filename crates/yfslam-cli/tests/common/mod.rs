@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
+pub mod layouts;
+
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};

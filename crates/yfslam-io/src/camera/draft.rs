@@ -57,6 +57,15 @@ impl Draft {
     pub fn into_source(self, kind: &'static str, settings: Option<Settings>, origin: String) -> CameraSource {
         let [fx, fy, cx, cy] = self.intrinsics;
         let [width, height] = self.size.unwrap_or_default();
+        let mut notes = self.notes;
+        let fy = if fy < 0.0 {
+            let text = "fy is negative, as in ICL-NUIM, whose y axis points up: here y points down, and fy is positive; its ground truth is \
+                        mirrored with --layout icl-nuim";
+            notes.push(text.into());
+            -fy
+        } else {
+            fy
+        };
         let mut camera = Camera::pinhole(width, height, fx, fy, cx, cy).with_distortion(self.lens.polynomial);
         camera.rational = self.lens.rational;
         camera.fps = self.fps.unwrap_or(camera.fps);
@@ -67,7 +76,6 @@ impl Draft {
             baseline: self.bf.is_none(),
             stereo_problem: self.stereo_problem,
         };
-        let mut notes = self.notes;
         let unused_keys = settings.map_or_else(Vec::new, |settings| {
             notes.extend(settings.notes.iter().cloned());
             settings.unused()

@@ -5,18 +5,13 @@ use std::io::Cursor;
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 use yfslam::{Image, RgbImage};
 
-use super::{
-    COLOR_KIND_CURE, COLOR_SIZE_CURE, DEPTH_KIND_CURE, DEPTH_SIZE_CURE, DecodeError, ImageSize, MASK_SIZE_CURE,
-    check_size,
-};
+use super::{COLOR_SIZE_CURE, DEPTH_KIND_CURE, DEPTH_SIZE_CURE, DecodeError, ImageSize, MASK_SIZE_CURE, check_size};
 
 type PngReader<'a> = Reader<Cursor<&'a [u8]>>;
 
 pub fn decode_color(bytes: &[u8], expected: Option<ImageSize>, into: &mut RgbImage) -> Result<(), DecodeError> {
-    let mut reader = open(bytes, Transformations::EXPAND)?;
-    if reader.info().bit_depth == BitDepth::Sixteen {
-        return Err(DecodeError::WrongKind { found: describe(&reader), cure: COLOR_KIND_CURE });
-    }
+    // Of 16 bits the upper 8 are kept.
+    let mut reader = open(bytes, Transformations::EXPAND | Transformations::STRIP_16)?;
     let size = size_of(&reader);
     check_size(size, expected, COLOR_SIZE_CURE)?;
     into.resize(size.width, size.height);

@@ -52,8 +52,8 @@ fn every_kind_of_colour_png_becomes_rgb() {
 }
 
 #[test]
-fn depth_keeps_all_sixteen_bits() {
-    assert_eq!(depth(&depth_png()).unwrap().data(), [0, 1, 256, 5000, 65535, 7]);
+fn depth_keeps_all_sixteen_bits_and_65535_is_no_measurement() {
+    assert_eq!(depth(&depth_png()).unwrap().data(), [0, 1, 256, 5000, 0, 7]);
 }
 
 fn mask(bytes: &[u8]) -> Result<Vec<u8>, DecodeError> {
@@ -99,8 +99,9 @@ fn images_of_the_wrong_kind_are_refused_by_name() {
     assert!(refusal(depth(&png(GrayscaleAlpha, Sixteen, &[1; 24]))).contains("16-bit grey-alpha"));
     assert!(refusal(depth(JPEG)).contains("JPEG, which cannot store depth"));
     assert!(refusal(depth(b"")).contains("an empty file"));
-    assert!(refusal(depth(b"P5\n3 2\n255\n")).contains("PNM"));
-    assert!(color(&depth_png()).unwrap_err().to_string().contains("a PNG of 16-bit grey; colour images"));
+    assert!(refusal(depth(b"P5\n3 2\n255\n123456")).contains("a PGM of 8 bits"));
+    assert!(refusal(depth(b"P4\n3 2\n")).contains("PNM"));
+    assert!(refusal(depth(b"RIFF0000WEBP")).contains("a WebP image; depth images are 16-bit grey PNG"));
     assert!(color(b"hello").unwrap_err().to_string().contains("unknown format"));
 }
 

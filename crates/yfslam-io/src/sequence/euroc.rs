@@ -12,9 +12,8 @@ use yfslam::Camera;
 use yfslam::config::DepthSource;
 
 use super::layout::{Calibration, Listing, stereo_or_mono};
-use super::lists::ListedFile;
 use super::pairs::{List, from_lists};
-use super::{GroundTruthReader, SequenceOptions};
+use super::{GroundTruthReader, ListedImage, SequenceOptions};
 use crate::camera::{CameraSource, check_camera};
 use crate::error::{Error, Result};
 use crate::rectify::{MountedCamera, StereoRectification};
@@ -41,10 +40,31 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     // Paths are relative to the folder of the whole sequence.
     let from_folder = |path: &Path| path.strip_prefix(folder).unwrap_or(path).to_owned();
     for entry in &mut entries {
-        entry.color_path = from_folder(&entry.color_path);
-        entry.paired_image.iter_mut().for_each(|paired| paired.path = from_folder(&paired.path));
+        entry.color.map_file(from_folder);
+        entry.paired_image.iter_mut().for_each(|paired| paired.image.map_file(from_folder));
     }
+    let truth =
+        ["state_groundtruth_estimate0", "mocap0", "leica0", "vicon0"].map(|name| root.join(name).join("data.csv"));
+    let truth = truth.iter().find(|path| path.is_file()).unwrap_or(&truth[0]).clone();
     let yaml = root.join("cam0/sensor.yaml");
+    if !options.read_calibration {
+        // The images belong to the camera of the caller. Where the file cannot be read, the ground truth is that of the body.
+        let t_body_cam = read_mounting(&yaml);
+        let mut notes = Vec::new();
+        if t_body_cam.is_none() && truth.is_file() {
+            notes.push(format!(
+                "the pose of the camera in {} cannot be read: the ground truth is that of the body",
+                yaml.display()
+            ));
+        }
+        let ground_truth = GroundTruthReader::euroc(truth, t_body_cam.unwrap_or_default());
+        return Ok(Listing { depth_source, entries, report, calibration: None, ground_truth, notes });
+    }
+    if !yaml.is_file() && (root.join("mocap0").is_dir() || folder.join("dso").is_dir()) {
+        let cure =
+            "undistort the images to those of a pinhole camera and give --camera, with --sensor mono for one camera";
+        return Err(Error::content(folder, "is a sequence of TUM-VI, whose fisheye cameras are not supported", cure));
+    }
     let left = read_camera(&yaml)?;
     let (calibration, t_body_cam) = if is_stereo {
         let right = read_camera(&root.join("cam1/sensor.yaml"))?;
@@ -57,29 +77,35 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     } else {
         (calibration(left.camera, &yaml, None), left.t_body_cam)
     };
-    let ground_truth = GroundTruthReader::euroc(root.join("state_groundtruth_estimate0/data.csv"), t_body_cam);
-    Ok(Listing { depth_source, entries, report, calibration: Some(calibration), ground_truth })
+    let ground_truth = GroundTruthReader::euroc(truth, t_body_cam);
+    Ok(Listing { depth_source, entries, report, calibration: Some(calibration), ground_truth, notes: Vec::new() })
+}
+
+/// Returns the pose of the camera in the body frame, if the file holds one.
+fn read_mounting(yaml: &Path) -> Option<Isometry3<f64>> {
+    let text = read_text(yaml).ok()?;
+    rigid_motion(numbers(&text, "data", yaml).ok()?.try_into().ok()?)
 }
 
 fn calibration(camera: Camera, yaml: &Path, rectification: Option<Arc<StereoRectification>>) -> Calibration {
     let origin = format!("{}{}", yaml.display(), if rectification.is_some() { ", rectified with cam1" } else { "" });
-    Calibration { camera: CameraSource::without_depth(camera, origin), rectification }
+    Calibration { camera: CameraSource::without_depth(camera, origin), rectification, depth_resampling: None }
 }
 
 /// Lists the images of a camera.
 fn read_list(camera: &Path) -> Result<List> {
     let path = camera.join("data.csv");
     let text = read_text(&path)?;
-    let file = |(number, line): (usize, &str)| {
+    let image = |(number, line): (usize, &str)| {
         let columns = line.split_once(',').map(|(stamp, name)| (stamp.trim(), name.trim()));
         let Some((stamp, name)) = columns.filter(|(_, name)| !name.is_empty()) else {
             let cure = "write 'nanoseconds,file', such as '1403636579763555584,1403636579763555584.png'";
             return Err(Error::line(&path, number, format!("'{line}' has another form"), cure));
         };
-        Ok(ListedFile { stamp_ns: nanoseconds(stamp, &path, number)?, path: camera.join("data").join(name) })
+        Ok(ListedImage { stamp_ns: nanoseconds(stamp, &path, number)?, image: camera.join("data").join(name).into() })
     };
-    let files = content_lines(&text).map(file).collect::<Result<_>>()?;
-    Ok(List { files, unstamped: 0, path })
+    let images = content_lines(&text).map(image).collect::<Result<_>>()?;
+    Ok(List { images, unstamped: 0, path })
 }
 
 fn nanoseconds(text: &str, path: &Path, number: usize) -> Result<i64> {

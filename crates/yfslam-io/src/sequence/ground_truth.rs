@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
 
-use super::{euroc, kitti};
+use super::{csv, euroc, icl_nuim, kitti, matrices};
 use crate::error::Result;
 use crate::text::read_text;
-use crate::trajectory::TrajectoryFile;
+use crate::trajectory::{StampedPose, TrajectoryFile};
 
 /// Reads the ground truth of a sequence.
 #[derive(Clone, Debug)]
@@ -28,6 +28,16 @@ enum Format {
     Euroc(Isometry3<f64>),
     /// Matrices of camera 0 at the given times, ns; the camera has the given pose in the frame of camera 0.
     Kitti(Isometry3<f64>, Vec<i64>),
+    /// A file with a matrix for each frame; time of the frame, ns, and file.
+    PoseFiles(Vec<(i64, PathBuf)>),
+    /// A matrix on each line, the first of frame 0, where the frame with this number is at time 0, at this many frames per second.
+    MatrixList(u64, f64),
+    /// Frame numbers and poses with y up, at this many frames per second.
+    IclNuim(f64),
+    /// A table whose header names the columns.
+    Csv,
+    /// Poses of the camera that were read from a bag.
+    Bag(Vec<StampedPose>),
 }
 
 impl GroundTruthReader {
@@ -43,9 +53,36 @@ impl GroundTruthReader {
         Self { path, format: Format::Kitti(t_cam0_cam, stamps_ns) }
     }
 
-    /// Returns the file in the folder if it exists.
+    /// Makes a reader of one pose file for each frame, which are in `folder`; without frames there is no ground truth.
+    pub(super) fn pose_files(folder: PathBuf, frames: Vec<(i64, PathBuf)>) -> Self {
+        Self { path: (!frames.is_empty()).then_some(folder), format: Format::PoseFiles(frames) }
+    }
+
+    pub(super) fn matrix_list(path: PathBuf, first: u64, fps: f64) -> Self {
+        Self { path: Some(path), format: Format::MatrixList(first, fps) }
+    }
+
+    pub(super) fn icl_nuim(path: PathBuf, fps: f64) -> Self {
+        Self { path: Some(path), format: Format::IclNuim(fps) }
+    }
+
+    pub(super) fn csv(path: PathBuf) -> Self {
+        Self { path: Some(path), format: Format::Csv }
+    }
+
+    /// Makes a reader of poses that were read from the bag at `path`.
+    pub(super) fn bag(path: PathBuf, poses: Vec<StampedPose>) -> Self {
+        Self { path: Some(path), format: Format::Bag(poses) }
+    }
+
+    /// Makes a reader of a sequence without ground truth.
+    pub(super) fn none() -> Self {
+        Self { path: None, format: Format::Tum }
+    }
+
+    /// Returns the file, or the folder of the pose files, if it exists.
     pub fn path(&self) -> Option<&Path> {
-        self.path.as_deref().filter(|path| path.is_file())
+        self.path.as_deref().filter(|path| path.exists())
     }
 
     /// Reads `path` in the format of the benchmark or of TUM; in the format of TUM the poses are those of the camera.
@@ -53,8 +90,24 @@ impl GroundTruthReader {
     /// # Errors
     /// The file cannot be read, or a line is malformed.
     pub fn read(&self, path: &Path) -> Result<TrajectoryFile> {
+        if let Format::Bag(poses) = &self.format
+            && self.path.as_deref() == Some(path)
+        {
+            return TrajectoryFile::from_poses(poses.clone(), path);
+        }
+        if let Format::PoseFiles(frames) = &self.format
+            && path.is_dir()
+        {
+            return matrices::read_pose_files(frames, path);
+        }
         let text = read_text(path)?;
         match &self.format {
+            Format::MatrixList(first, fps) if matrices::is_matrix_list(&text) => {
+                let stamp_ns = |index: usize| ((index as f64 - *first as f64) / fps * 1e9).round() as i64;
+                matrices::parse_matrix_list(&text, path, stamp_ns)
+            }
+            Format::IclNuim(fps) => TrajectoryFile::parse(&text, path).map(|truth| icl_nuim::convert(truth, *fps)),
+            Format::Csv if text.contains(',') => csv::parse_poses(&text, path),
             Format::Euroc(t_body_cam) if text.contains(',') => euroc::parse_ground_truth(&text, path, t_body_cam),
             Format::Kitti(t_cam0_cam, stamps_ns) if kitti::is_ground_truth(&text) => {
                 kitti::parse_ground_truth(&text, path, t_cam0_cam, stamps_ns)

@@ -66,15 +66,16 @@ fn median(values: &mut [i64]) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sequence::lists::ListedFile;
-    use crate::sequence::{AssociationReport, GroundTruthReader, Layout};
+    use std::path::PathBuf;
+
+    use crate::sequence::{AssociationReport, GroundTruthReader, Layout, ListedImage};
     use yfslam::config::DepthSource;
 
     fn sequence(stamps: &[(i64, i64)]) -> Sequence {
         let entry = |&(timestamp_ns, stamp_ns): &(i64, i64)| FrameEntry {
             timestamp_ns,
-            color_path: "c".into(),
-            paired_image: Some(ListedFile { stamp_ns, path: "d".into() }),
+            color: PathBuf::from("c").into(),
+            paired_image: Some(ListedImage { stamp_ns, image: PathBuf::from("d").into() }),
         };
         Sequence {
             folder: ".".into(),
@@ -85,6 +86,9 @@ mod tests {
             entries: stamps.iter().map(entry).collect(),
             report: AssociationReport::default(),
             mirror: None,
+            unread_calibration: None,
+            because: String::new(),
+            notes: Vec::new(),
         }
     }
 

@@ -10,9 +10,8 @@ use yfslam::config::DepthSource;
 use yfslam::{Camera, RgbImage};
 
 use super::layout::{Calibration, Listing, stereo_or_mono};
-use super::lists::ListedFile;
 use super::pairs::{List, from_lists};
-use super::{GroundTruthReader, SequenceOptions};
+use super::{GroundTruthReader, ListedImage, SequenceOptions};
 use crate::camera::{CameraSource, check_camera};
 use crate::decode::decode_color;
 use crate::error::{Error, Result};
@@ -22,6 +21,9 @@ use crate::trajectory::{StampedPose, TrajectoryFile};
 
 /// Numbers of the left and right cameras, the preferred pair first.
 const PAIRS: [[usize; 2]; 2] = [[2, 3], [0, 1]];
+
+/// Endings of image files, that of the benchmark first.
+const ENDINGS: [&str; 4] = ["png", "jpg", "jpeg", "pgm"];
 
 /// A 3 × 4 matrix, row-major.
 type Rows = [f64; 12];
@@ -35,6 +37,13 @@ fn images(folder: &Path, camera: usize) -> PathBuf {
     folder.join(format!("image_{camera}"))
 }
 
+/// Returns the file of an image relative to `folder`; its ending is that of the file that exists, else that of the benchmark.
+fn image_file(folder: &Path, camera: usize, index: usize) -> PathBuf {
+    let file = |ending: &str| PathBuf::from(format!("image_{camera}/{index:06}.{ending}"));
+    let found = ENDINGS.iter().map(|ending| file(ending)).find(|path| folder.join(path).is_file());
+    found.unwrap_or_else(|| file("png"))
+}
+
 /// Lists the frames of `folder`.
 pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     let exists = |[left, _]: &&[usize; 2]| images(folder, *left).is_dir();
@@ -43,24 +52,30 @@ pub fn list(folder: &Path, options: &SequenceOptions) -> Result<Listing> {
     let path = folder.join("times.txt");
     let stamps_ns = times(&path)?;
     let list_of = |camera: usize| {
-        let file = |(index, &stamp_ns): (usize, &i64)| ListedFile {
+        let image = |(index, &stamp_ns): (usize, &i64)| ListedImage {
             stamp_ns,
-            path: format!("image_{camera}/{index:06}.png").into(),
+            image: image_file(folder, camera, index).into(),
         };
-        List { files: stamps_ns.iter().enumerate().map(file).collect(), unstamped: 0, path: path.clone() }
+        List { images: stamps_ns.iter().enumerate().map(image).collect(), unstamped: 0, path: path.clone() }
     };
     let right_images = (depth_source == DepthSource::Stereo).then(|| list_of(right));
     let (entries, report) = from_lists(folder, list_of(left), right_images, 0)?;
     let calib = folder.join("calib.txt");
+    if !options.read_calibration {
+        // The pose of the camera beside camera 0 is that of calib.txt, if it can be read.
+        let mounting = read_text(&calib).and_then(|text| projection(&text, left, &calib)).map(|p| t_cam0_cam(&p));
+        let ground_truth = GroundTruthReader::kitti(ground_truth_path(folder), mounting.unwrap_or_default(), stamps_ns);
+        return Ok(Listing { depth_source, entries, report, calibration: None, ground_truth, notes: Vec::new() });
+    }
     let text = read_text(&calib)?;
     let (p_left, p_right) = (projection(&text, left, &calib)?, projection(&text, right, &calib)?);
-    let camera =
-        camera(folder, &entries.first().map(|entry| folder.join(&entry.color_path)), &p_left, &p_right, &stamps_ns)?;
+    let first = entries.first().and_then(|entry| Some(folder.join(entry.color.file()?)));
+    let camera = camera(folder, &first, &p_left, &p_right, &stamps_ns)?;
     let camera = CameraSource::without_depth(camera, calib.display().to_string());
     check_camera(&camera)?;
-    let calibration = Some(Calibration { camera, rectification: None });
+    let calibration = Some(Calibration { camera, rectification: None, depth_resampling: None });
     let ground_truth = GroundTruthReader::kitti(ground_truth_path(folder), t_cam0_cam(&p_left), stamps_ns);
-    Ok(Listing { depth_source, entries, report, calibration, ground_truth })
+    Ok(Listing { depth_source, entries, report, calibration, ground_truth, notes: Vec::new() })
 }
 
 /// Reads the times of all frames, ns.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::csv::exponent_of;
 use crate::error::{Error, Result};
 use crate::text::content_lines;
 use crate::time::parse_stamp_ns;
@@ -67,7 +68,12 @@ fn listed_file(stamp: &str, name: &str, source: &Path, line: usize) -> Result<Op
     if stamp.eq_ignore_ascii_case("nan") {
         return Ok(None);
     }
-    let stamp_ns = parse_stamp_ns(stamp).map_err(|error| {
+    // Numbers that are too large for seconds are in milli-, micro- or nanoseconds.
+    let parsed = match exponent_of(stamp) {
+        0 => parse_stamp_ns(stamp),
+        exponent => parse_stamp_ns(&format!("{stamp}e{exponent}")),
+    };
+    let stamp_ns = parsed.map_err(|error| {
         Error::line(
             source,
             line,
@@ -89,7 +95,7 @@ pub fn color_is_second(pairs: &[[ListedFile; 2]]) -> Option<bool> {
 }
 
 /// Returns whether the words in the path name a depth image or a colour image; `None` for neither.
-fn names_depth(path: &Path) -> Option<bool> {
+pub(super) fn names_depth(path: &Path) -> Option<bool> {
     let name = path.to_string_lossy().to_lowercase();
     if name.contains("depth") {
         return Some(true);
@@ -132,10 +138,16 @@ mod tests {
         assert!(error.contains("rgb.txt:3") && error.contains("not-a-number"), "{error}");
         let error = list("1.0\n").unwrap_err().to_string();
         assert!(error.contains("rgb.txt:1") && error.contains("one column"), "{error}");
-        let error = list("1305031102175304000 a.png").unwrap_err().to_string();
-        assert!(error.contains("nanoseconds"), "{error}");
         let error = pairs("1 a 2\n").unwrap_err().to_string();
         assert!(error.contains("associations.txt:1") && error.contains("3 columns"), "{error}");
+    }
+
+    #[test]
+    fn stamps_that_are_too_large_for_seconds_are_in_smaller_units() {
+        let text = "1305031102175304001 a.png\n1305031102275304 b.png\n1305031102375 c.png\n1305031103.5 d.png\n";
+        let stamps: Vec<i64> = list(text).unwrap().iter().map(|file| file.stamp_ns).collect();
+        let second = 1_305_031_102_000_000_000;
+        assert_eq!(stamps, [175_304_001, 275_304_000, 375_000_000, 1_500_000_000].map(|ns| second + ns));
     }
 
     #[test]

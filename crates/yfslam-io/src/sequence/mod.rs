@@ -1,17 +1,31 @@
-//! A recorded sequence: a folder in the layout of the TUM RGB-D benchmark, which the Bonn data set shares, or of the stereo benchmarks
-//! EuRoC and KITTI.
+//! A recorded sequence: a folder in the layout of a data set, such as TUM RGB-D, EuRoC or ScanNet, or as recorders write it.
 //!
 //! In: the folder and [`SequenceOptions`]. Out: the frames in order, and a report of what was skipped and why.
 
 mod associate;
+mod bag;
+mod csv;
+mod detect;
+mod eth3d;
 pub(crate) mod euroc;
+mod folders;
 mod ground_truth;
+mod icl_nuim;
+mod image_ref;
+mod images;
 mod info;
+mod intrinsics;
 pub(crate) mod kitti;
 mod layout;
 pub mod lists;
+mod matrices;
+mod openloris;
 mod pairs;
+mod replica;
+mod scannet;
+mod seven_scenes;
 mod tum;
+mod vslam_lab;
 
 use std::path::{Path, PathBuf};
 
@@ -19,13 +33,14 @@ use yfslam::config::DepthSource;
 
 use crate::error::{Error, Result};
 use crate::time::TimeMirror;
+pub use bag::TopicChoice;
 pub use ground_truth::GroundTruthReader;
+pub use image_ref::{ImageRef, ListedImage};
 pub use info::{SequenceInfo, TimeOffset};
 pub use layout::{Calibration, Layout};
-use lists::ListedFile;
 
 /// Options for reading a sequence, and the part of it that is played.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SequenceOptions {
     /// The images that are read; `None` reads those that exist, depth images before right images.
     pub depth_source: Option<DepthSource>,
@@ -38,23 +53,63 @@ pub struct SequenceOptions {
     pub end: Option<usize>,
     /// Plays the part backward, with mirrored stamps; see [`TimeMirror`].
     pub reverse: bool,
+    /// The layout; `None` detects it.
+    pub layout: Option<Layout>,
+    /// Frames per second of images without time stamps; `None` takes [`DEFAULT_FPS`].
+    pub fps: Option<f64>,
+    /// List of pairs that is read instead of the lists in the folder.
+    pub associations: Option<PathBuf>,
+    /// Folder of the colour images, where there is no list.
+    pub color_folder: Option<PathBuf>,
+    /// Folder of the depth images, where there is no list.
+    pub depth_folder: Option<PathBuf>,
+    /// Whether the calibration that is part of a layout is read; a caller with a camera of its own leaves it out.
+    pub read_calibration: bool,
+    /// Topics of a bag.
+    pub topics: TopicChoice,
 }
+
+/// Rates that a camera can have, frames per second.
+const FPS_RANGE: std::ops::RangeInclusive<f64> = 0.01..=10_000.0;
+
+/// Frames per second of images without time stamps: that of most RGB-D cameras.
+pub const DEFAULT_FPS: f64 = 30.0;
 
 impl Default for SequenceOptions {
     fn default() -> Self {
-        Self { depth_source: None, association_tolerance_ns: 20_000_000, start: 0, end: None, reverse: false }
+        Self {
+            depth_source: None,
+            association_tolerance_ns: 20_000_000,
+            start: 0,
+            end: None,
+            reverse: false,
+            layout: None,
+            fps: None,
+            associations: None,
+            color_folder: None,
+            depth_folder: None,
+            read_calibration: true,
+            topics: TopicChoice::default(),
+        }
     }
 }
 
-/// The image files of one frame.
+impl SequenceOptions {
+    /// Returns the frames per second of images without time stamps.
+    fn fps(&self) -> f64 {
+        self.fps.unwrap_or(DEFAULT_FPS)
+    }
+}
+
+/// The images of one frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameEntry {
     /// Time of the colour image and the frame, ns.
     pub timestamp_ns: i64,
     /// The colour image.
-    pub color_path: PathBuf,
+    pub color: ImageRef,
     /// The depth image or the right image, depending on [`Sequence::depth_source`]; `None` for a monocular camera.
-    pub paired_image: Option<ListedFile>,
+    pub paired_image: Option<ListedImage>,
 }
 
 /// Result of the association, for the whole sequence.
@@ -101,6 +156,12 @@ pub struct Sequence {
     pub calibration: Option<Calibration>,
     /// Reader of the ground truth.
     pub ground_truth: GroundTruthReader,
+    /// File of the calibration that was not read because the caller has a camera of its own.
+    pub unread_calibration: Option<PathBuf>,
+    /// Why the folder was taken for this layout.
+    pub because: String,
+    /// What was assumed or changed when the sequence was read, one sentence each.
+    pub notes: Vec<String>,
 }
 
 impl Sequence {
@@ -113,37 +174,50 @@ impl Sequence {
             let problem = format!("association tolerance {} ns is negative", options.association_tolerance_ns);
             return Err(Error::argument(problem, "give a time of 0 or more, such as 20 ms"));
         }
-        let layout = Layout::of(folder);
-        let layout::Listing { depth_source, mut entries, mut report, calibration, ground_truth } =
+        if let Some(fps) = options.fps.filter(|fps| !FPS_RANGE.contains(fps)) {
+            return Err(Error::argument(format!("{fps} frames per second are out of range"), "give a rate such as 30"));
+        }
+        let (layout, because) = detect::layout(folder, options);
+        let layout::Listing { depth_source, mut entries, mut report, calibration, ground_truth, notes } =
             layout.list(folder, options)?;
         for entry in &mut entries {
-            entry.color_path = folder.join(&entry.color_path);
+            entry.color.map_file(|path| folder.join(path));
             if let Some(paired) = &mut entry.paired_image {
-                paired.path = folder.join(&paired.path);
+                paired.image.map_file(|path| folder.join(path));
             }
         }
         report.paired = entries.len();
         report.missing_files = entries.iter().filter(|entry| entry.missing().is_some()).count();
         if let Some(first) = entries.first().filter(|_| report.missing_files == report.paired) {
-            let missing = first.missing().unwrap_or(&first.color_path);
-            let problem = format!(
-                "none of its {} frames has all its image files; the first missing is {}",
-                report.paired,
-                missing.display()
-            );
+            let missing = first.missing().unwrap_or(&first.color);
+            let problem =
+                format!("none of its {} frames has all its image files; the first missing is {missing}", report.paired);
             return Err(Error::content(folder, problem, "unpack the images beside the lists"));
         }
+        let unread_calibration = layout.calibration_file(folder).filter(|_| !options.read_calibration);
         let (entries, mirror) = cut(folder, entries, options)?;
         let folder = folder.into();
-        Ok(Self { folder, layout, depth_source, entries, report, mirror, calibration, ground_truth })
+        Ok(Self {
+            unread_calibration,
+            folder,
+            layout,
+            depth_source,
+            entries,
+            report,
+            mirror,
+            calibration,
+            ground_truth,
+            because,
+            notes,
+        })
     }
 }
 
 impl FrameEntry {
     /// Returns the first of its files that does not exist.
-    fn missing(&self) -> Option<&Path> {
-        let paired = self.paired_image.iter().map(|paired| paired.path.as_path());
-        std::iter::once(self.color_path.as_path()).chain(paired).find(|path| !path.is_file())
+    fn missing(&self) -> Option<&ImageRef> {
+        let paired = self.paired_image.iter().map(|paired| &paired.image);
+        std::iter::once(&self.color).chain(paired).find(|image| image.is_missing())
     }
 }
 

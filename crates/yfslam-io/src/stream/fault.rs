@@ -1,9 +1,8 @@
 //! Reasons why a frame cannot be used.
 
-use std::path::PathBuf;
-
 use crate::decode::DecodeError;
 use crate::error::Error;
+use crate::sequence::ImageRef;
 use crate::time::format_stamp;
 
 /// A frame that cannot be used; the caller counts it and continues.
@@ -21,23 +20,26 @@ pub struct FrameError {
 /// What is wrong with a frame.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameFault {
-    /// A file is missing or cannot be read.
+    /// A file or a message is missing or cannot be read.
     #[error(transparent)]
     Unreadable(Error),
-    /// A file cannot be decoded as the image that is needed.
-    #[error("{} {source}", path.display())]
+    /// A file or a message cannot be decoded as the image that is needed.
+    #[error("{image} {source}")]
     Image {
-        /// The file.
-        path: PathBuf,
+        /// Where it is stored.
+        image: ImageRef,
         /// What is wrong with it.
         source: DecodeError,
     },
     /// Every pixel of the depth image is 0.
-    #[error("{} has no depth in any pixel; check the depth sensor", path.display())]
+    #[error("{image} has no depth in any pixel; check the depth sensor")]
     NoDepth {
-        /// The depth image.
-        path: PathBuf,
+        /// Where the depth image is stored.
+        image: ImageRef,
     },
+    /// The frame has no depth or right image, although the sequence has them.
+    #[error("has no depth or right image; check the lists of the sequence")]
+    NotListed,
     /// A decoder thread panicked, which is a defect of the decoder.
     #[error("the decoder stopped; please report this sequence as a defect")]
     DecoderStopped,

@@ -6,7 +6,6 @@
 mod fault;
 mod prefetch_queue;
 
-use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -14,11 +13,13 @@ use yfslam::config::DepthSource;
 use yfslam::{DepthImage, Frame, RgbImage};
 
 use crate::camera::CameraSource;
-use crate::decode::{DecodeError, ImageSize, decode_color, decode_depth};
-use crate::error::{Error, Result};
+use crate::decode::{DecodeError, ImageSize, decode_color, decode_depth_image};
+use crate::depth_resampling::DepthResampling;
+use crate::error::Result;
+use crate::message::wire::Wire;
+use crate::message::{MessageType, decode_color_message, decode_depth_message};
 use crate::rectify::{Remap, StereoRectification};
-use crate::sequence::{FrameEntry, Sequence};
-use crate::text::read_bytes;
+use crate::sequence::{FrameEntry, ImageRef, Sequence};
 pub use fault::{FrameError, FrameFault};
 use prefetch_queue::{Decoded, PrefetchQueue};
 
@@ -61,21 +62,25 @@ impl FrameStream {
         let camera = &source.camera;
         let entries: Arc<[FrameEntry]> = sequence.entries.as_slice().into();
         let size = ImageSize { width: camera.width, height: camera.height };
-        let metres_per_unit = (1.0 / source.depth_factor) as f32;
-        let rectification = sequence.calibration.as_ref().and_then(|calibration| calibration.rectification.clone());
+        let calibration = sequence.calibration.as_ref();
+        let rectification = calibration.and_then(|calibration| calibration.rectification.clone());
+        let resampling = calibration.and_then(|calibration| calibration.depth_resampling.clone());
         let mut read_left = ColorReader { size, bytes: Vec::new(), rectification };
         let mut read_right = ColorReader { bytes: Vec::new(), ..read_left.clone() };
         let color = PrefetchQueue::start("yfslam-color", entries.clone(), look_ahead, move |entry| {
-            read_left.read(&entry.color_path, StereoRectification::left)
+            read_left.read(Some(&entry.color), StereoRectification::left)
         })?;
         let mut bytes = Vec::new();
         let paired_images = match sequence.depth_source {
             DepthSource::Image => {
-                let read = move |entry: &FrameEntry| read_depth(paired_path(entry), size, metres_per_unit, &mut bytes);
+                let depth_factor = source.depth_factor;
+                let read = move |entry: &FrameEntry| {
+                    read_depth(paired(entry), size, depth_factor, resampling.as_deref(), &mut bytes)
+                };
                 PairedImages::Depth(PrefetchQueue::start("yfslam-depth", entries.clone(), look_ahead, read)?)
             }
             DepthSource::Stereo => {
-                let read = move |entry: &FrameEntry| read_right.read(paired_path(entry), StereoRectification::right);
+                let read = move |entry: &FrameEntry| read_right.read(paired(entry), StereoRectification::right);
                 PairedImages::Right(PrefetchQueue::start("yfslam-right", entries.clone(), look_ahead, read)?)
             }
             DepthSource::Motion => PairedImages::None,
@@ -162,40 +167,85 @@ struct ColorReader {
 impl ColorReader {
     fn read(
         &mut self,
-        path: &Path,
+        image: Option<&ImageRef>,
         side: fn(&StereoRectification) -> &Remap,
     ) -> std::result::Result<RgbImage, FrameFault> {
-        let mut image = RgbImage::default();
-        read(path, &mut self.bytes)?;
-        decode_color(&self.bytes, Some(self.size), &mut image).map_err(|error| image_fault(path, error))?;
-        Ok(self.rectification.as_deref().map(|rectification| side(rectification).apply(&image)).unwrap_or(image))
+        let mut color = RgbImage::default();
+        open_color(image.ok_or(FrameFault::NotListed)?, Some(self.size), &mut self.bytes, &mut color)?;
+        Ok(self.rectification.as_deref().map(|rectification| side(rectification).apply(&color)).unwrap_or(color))
     }
 }
 
 fn read_depth(
-    path: &Path,
+    image: Option<&ImageRef>,
     size: ImageSize,
-    metres_per_unit: f32,
+    depth_factor: f64,
+    resampling: Option<&DepthResampling>,
     bytes: &mut Vec<u8>,
 ) -> std::result::Result<DepthImage, FrameFault> {
-    let mut image = DepthImage { metres_per_unit, ..Default::default() };
-    read(path, bytes)?;
-    decode_depth(bytes, Some(size), &mut image.raw).map_err(|error| image_fault(path, error))?;
-    if image.raw.data().iter().all(|&raw| raw == 0) {
-        return Err(FrameFault::NoDepth { path: path.into() });
+    let image = image.ok_or(FrameFault::NotListed)?;
+    let mut depth = DepthImage::default();
+    let size =
+        resampling.map_or(size, |resampling| ImageSize { width: resampling.from[0], height: resampling.from[1] });
+    open_depth(image, Some(size), depth_factor, bytes, &mut depth)?;
+    if depth.raw.data().iter().all(|&raw| raw == 0) {
+        return Err(FrameFault::NoDepth { image: image.clone() });
     }
-    Ok(image)
+    if let Some(resampling) = resampling {
+        depth.raw = resampling.apply(&depth.raw);
+    }
+    Ok(depth)
 }
 
-/// Returns the path of the paired image; it is empty, which gives an error on reading, if there is none.
-fn paired_path(entry: &FrameEntry) -> &Path {
-    entry.paired_image.as_ref().map_or(Path::new(""), |paired| &paired.path)
+fn paired(entry: &FrameEntry) -> Option<&ImageRef> {
+    entry.paired_image.as_ref().map(|paired| &paired.image)
 }
 
-fn read(path: &Path, bytes: &mut Vec<u8>) -> std::result::Result<(), FrameFault> {
-    read_bytes(path, bytes).map_err(|source| FrameFault::Unreadable(Error::read(path, source)))
+/// Reads and decodes a colour image, as [`decode_color`] does. `bytes` is a buffer that may be reused.
+///
+/// # Errors
+/// The file or message cannot be read, or is not such an image.
+pub fn open_color(
+    image: &ImageRef,
+    expected: Option<ImageSize>,
+    bytes: &mut Vec<u8>,
+    into: &mut RgbImage,
+) -> std::result::Result<(), FrameFault> {
+    image.read(bytes).map_err(FrameFault::Unreadable)?;
+    let decoded = match kind(image) {
+        Some((kind, wire)) => decode_color_message(kind, wire, bytes, expected, into),
+        None => decode_color(bytes, expected, into),
+    };
+    decoded.map_err(|error| image_fault(image, error))
 }
 
-fn image_fault(path: &Path, source: DecodeError) -> FrameFault {
-    FrameFault::Image { path: path.into(), source }
+/// Reads and decodes a depth image, as [`decode_depth_image`] does. `bytes` is a buffer that may be reused.
+///
+/// # Errors
+/// The file or message cannot be read, or is not such an image.
+pub fn open_depth(
+    image: &ImageRef,
+    expected: Option<ImageSize>,
+    depth_factor: f64,
+    bytes: &mut Vec<u8>,
+    into: &mut DepthImage,
+) -> std::result::Result<(), FrameFault> {
+    image.read(bytes).map_err(FrameFault::Unreadable)?;
+    let decoded = match kind(image) {
+        Some((kind, wire)) => decode_depth_message(kind, wire, bytes, depth_factor, expected, into),
+        None => decode_depth_image(bytes, expected, depth_factor, into),
+    };
+    decoded.map_err(|error| image_fault(image, error))
+}
+
+/// Returns how the bytes of a message are read; `None` for those of a file.
+fn kind(image: &ImageRef) -> Option<(MessageType, Wire)> {
+    match image {
+        ImageRef::File(_) => None,
+        ImageRef::Message(message) => message.kind(),
+    }
+}
+
+fn image_fault(image: &ImageRef, source: DecodeError) -> FrameFault {
+    FrameFault::Image { image: image.clone(), source }
 }

@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     fn entries(count: i64) -> Arc<[FrameEntry]> {
-        let entry = |t| FrameEntry { timestamp_ns: t, color_path: "c".into(), paired_image: None };
+        let entry = |t| FrameEntry { timestamp_ns: t, color: std::path::PathBuf::from("c").into(), paired_image: None };
         (0..count).map(entry).collect()
     }
 

@@ -2,6 +2,9 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
+pub mod bags;
+pub mod sqlite;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -159,6 +159,8 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         "--dense needs depth images, which {} does not have or --sensor leaves unused; leave it out",
         source.name
     );
+    source.notes.iter().for_each(|note| terminal.note(note));
+    source.warnings.iter().for_each(|warning| terminal.warn(warning));
     if let Some(masks) = &source.masks {
         report_masks(masks, terminal);
     }
@@ -186,7 +188,8 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
     };
     let only_results: Vec<&RunResult> = results.iter().map(|recorded| &recorded.result).collect();
     let costs = frame_costs(&process, &detection, &only_results);
-    let (sequence, faults) = (args.source.sequence.as_str(), args.source.faults.as_slice());
+    let sequence = args.source.folder().to_string_lossy();
+    let (sequence, faults) = (&*sequence, args.source.faults.as_slice());
     let source = &source;
     let runs: Vec<ReportedRun> = results
         .iter()

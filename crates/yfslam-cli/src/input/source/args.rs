@@ -3,24 +3,48 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use yfslam::config::DepthSource;
 use yfslam_io::boxes::BOXES_FILE;
+use yfslam_io::sequence::Layout;
 use yfslam_io::{Fault, load_camera};
 use yfslam_synth::{WorldConfig, default_camera, parse_with_camera};
 
+use super::bag::BagArgs;
 use super::masks::{MaskTally, Masks};
 
 /// Largest difference between the time stamps of a colour and a depth image, ms. Source: the tool of the TUM RGB-D benchmark.
-const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
+pub const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
 
 /// Which sequence is read, and how.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Input")]
 pub struct SourceArgs {
-    /// Folder in TUM RGB-D, Bonn, EuRoC or KITTI odometry layout, or a synthetic world such as `synth:walking_xyz?seed=7`.
-    #[arg(value_name = "SEQUENCE", help_heading = None)]
+    /// Folder of a recording in any of the layouts of --layout, a bag (.bag, .mcap, .db3 or folder), or a synthetic world such as `synth:walking_xyz?seed=7`.
+    #[arg(
+        value_name = "SEQUENCE",
+        help_heading = None,
+        required_unless_present = "color",
+        default_value = "",
+        hide_default_value = true
+    )]
     pub sequence: String,
+    /// Layout of the folder [default: detected; `yfslam info SEQUENCE` explains it].
+    #[arg(long, value_name = "NAME", value_parser = layout_parser())]
+    pub layout: Option<Layout>,
+    /// List of the pairs of colour and depth images: `stamp rgb-file stamp depth-file` [default: the list in the folder].
+    #[arg(long, value_name = "FILE")]
+    pub associations: Option<PathBuf>,
+    /// Folder of the colour images, where there is no list [default: color, rgb and similar names in the folder].
+    #[arg(long, value_name = "DIR")]
+    pub color: Option<PathBuf>,
+    /// Folder of the depth images, where there is no list [default: depth and similar names in the folder].
+    #[arg(long, value_name = "DIR")]
+    pub depth: Option<PathBuf>,
+    /// Frames per second of images without time stamps [default: 30].
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub fps: Option<f64>,
     /// Camera: a preset such as tum1, bonn or d435i, or a camera file of any common kind [default: the camera file in the folder].
     #[arg(long, value_name = "PRESET|FILE")]
     pub camera: Option<String>,
@@ -30,9 +54,9 @@ pub struct SourceArgs {
     /// Depth units per metre [default: those of the camera; TUM and Bonn have 5000, images in millimetres have 1000].
     #[arg(long, value_name = "F", allow_negative_numbers = true)]
     pub depth_factor: Option<f64>,
-    /// Largest difference between the time stamps of a colour image and its depth or right image, ms.
-    #[arg(long, value_name = "MS", default_value_t = ASSOCIATION_TOLERANCE_MS, allow_negative_numbers = true)]
-    pub association_tolerance: f64,
+    /// Largest difference between the time stamps of a colour image and its depth or right image, ms [default: 20].
+    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    pub association_tolerance: Option<f64>,
     /// Folder with a mask of movable objects for each colour image, for the methods ds, dyna and full.
     #[arg(long, value_name = "DIR")]
     pub masks: Option<PathBuf>,
@@ -48,6 +72,15 @@ pub struct SourceArgs {
     /// Inject a fault from START seconds on for SECONDS; the option can be given several times.
     #[arg(long = "fault", value_name = "KIND@START+SECONDS")]
     pub faults: Vec<Fault>,
+    #[command(flatten)]
+    pub bag: BagArgs,
+}
+
+/// Parses the name of a layout.
+fn layout_parser() -> impl TypedValueParser<Value = Layout> {
+    PossibleValuesParser::new(Layout::ALL.map(Layout::key)).try_map(|name| {
+        Layout::ALL.into_iter().find(|layout| layout.key() == name).ok_or_else(|| format!("unknown layout {name}"))
+    })
 }
 
 /// Types of cameras.
@@ -79,11 +112,17 @@ impl SourceArgs {
             sensor: None,
             depth_factor: None,
             masks: None,
-            association_tolerance: ASSOCIATION_TOLERANCE_MS,
+            layout: None,
+            associations: None,
+            color: None,
+            depth: None,
+            fps: None,
+            association_tolerance: None,
             start: 0,
             end: None,
             reverse: false,
             faults: Vec::new(),
+            bag: BagArgs::default(),
         }
     }
 
@@ -145,7 +184,10 @@ impl SourceArgs {
         yfslam_synth::is_spec(&self.sequence)
     }
 
+    /// Returns the folder of the sequence: the one that the user named, else that in which the folder of colour images is.
     pub fn folder(&self) -> &Path {
-        Path::new(&self.sequence)
+        let parent = self.color.as_deref().and_then(Path::parent).filter(|_| self.sequence.is_empty());
+        let parent = parent.map(|parent| if parent.as_os_str().is_empty() { Path::new(".") } else { parent });
+        parent.unwrap_or(Path::new(&self.sequence))
     }
 }

@@ -1,6 +1,7 @@
-//! Recorded sequences: folders in TUM RGB-D, Bonn, EuRoC or KITTI odometry layout.
+//! Recorded sequences: folders in one of the layouts that `yfslam-io` detects.
 
 use std::io::ErrorKind;
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
@@ -11,12 +12,12 @@ use yfslam_io::camera::check_camera;
 use yfslam_io::decode::DecodeError;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
 use yfslam_io::{
-    BoxList, CameraSource, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording, complete_camera,
-    detect_camera, load_camera,
+    BoxList, CameraSource, DepthStatistics, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording,
+    complete_camera, detect_camera, load_camera,
 };
 
 use super::Source;
-use super::args::SourceArgs;
+use super::args::{ASSOCIATION_TOLERANCE_MS, SourceArgs};
 use super::frames::{FolderExtras, Frames, Player};
 use super::masks::Masks;
 use crate::stats::skip::Skip;
@@ -32,7 +33,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     if !camera.unused_keys.is_empty() {
         tracing::info!(file = camera.origin, keys = ?camera.unused_keys, "keys of the camera file that are not used");
     }
-    check(&sequence, &camera)?;
+    let depths = check(&sequence, &camera)?;
     let boxes = match own_boxes {
         Some(classes) => Some(BoxList::read(&args.boxes_file())?.detections(classes)),
         None => None,
@@ -42,8 +43,18 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let stream = FrameStream::open(&sequence, &camera, DEFAULT_LOOK_AHEAD)?;
     let extras = FolderExtras { boxes, mirror: sequence.mirror, masks };
     let stamps_ns: Vec<i64> = sequence.entries.iter().map(|entry| entry.timestamp_ns).collect();
+    let mut notes = vec![recognised(&sequence, &camera)];
+    notes.extend(sequence.notes.iter().cloned());
+    notes.extend(replaced_camera(args, &sequence));
+    let mut warnings: Vec<String> = depths.and_then(|depths| depths.warning(camera.depth_factor)).into_iter().collect();
+    if sequence.report.from_associations_file && args.association_tolerance.is_some() {
+        let text = "--association-tolerance has no effect: the list already has the pairs of colour and depth images";
+        warnings.push(text.into());
+    }
     Ok(Source {
         name: name(args),
+        notes,
+        warnings,
         camera,
         depth_source: sequence.depth_source,
         frames: Frames::new(Player::Folder(Box::new((stream, extras))), sequence.depth_source, args, &stamps_ns),
@@ -57,12 +68,15 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
 
 /// Checks camera and depth factor against the first frames or, if those are unusable, against frames of the whole sequence: some sensors
 /// deliver unusable frames at the start.
-fn check(sequence: &Sequence, camera: &CameraSource) -> Result<()> {
-    let Err(error) = check_recording(sequence, camera) else { return Ok(()) };
+fn check(sequence: &Sequence, camera: &CameraSource) -> Result<Option<DepthStatistics>> {
+    let error = match check_recording(sequence, camera) {
+        Ok(depths) => return Ok(depths),
+        Err(error) => error,
+    };
     let step = sequence.entries.len().div_ceil(PROBES).max(1);
     let entries = sequence.entries.iter().step_by(step).cloned().collect();
     match (&error, check_recording(&Sequence { entries, ..sequence.clone() }, camera)) {
-        (Error::Content { .. }, Ok(_)) => Ok(()),
+        (Error::Content { .. }, Ok(depths)) => Ok(depths),
         _ => Err(error.into()),
     }
 }
@@ -73,7 +87,7 @@ fn check(sequence: &Sequence, camera: &CameraSource) -> Result<()> {
 /// # Errors
 /// The tolerance is negative or not a number, or the folder has no usable lists.
 pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequence, Result<CameraSource>)> {
-    let tolerance_ms = args.association_tolerance;
+    let tolerance_ms = args.association_tolerance.unwrap_or(ASSOCIATION_TOLERANCE_MS);
     ensure!(
         (0.0..=1e6).contains(&tolerance_ms),
         "--association-tolerance is {tolerance_ms}; give milliseconds, such as 20"
@@ -84,14 +98,27 @@ pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequ
         start: args.start,
         end: args.end,
         reverse: args.reverse,
-    };
-    let mut sequence = Sequence::open(args.folder(), &options)?;
-    if args.camera.is_some() {
+        layout: args.layout,
+        fps: args.fps,
+        associations: args.associations.clone(),
+        color_folder: args.color.clone(),
+        depth_folder: args.depth.clone(),
         // The images are taken as they are: the calibration of the folder does not apply to another camera.
-        sequence.calibration = None;
-    }
+        read_calibration: args.camera.is_none(),
+        topics: args.bag.choice(),
+    };
+    let sequence = Sequence::open(args.folder(), &options)?;
     let camera = camera(args, &sequence);
     Ok((sequence, camera))
+}
+
+/// Names the calibration of the layout that --camera replaces.
+fn replaced_camera(args: &SourceArgs, sequence: &Sequence) -> Option<String> {
+    let given = args.camera.as_ref()?;
+    let own = sequence.unread_calibration.as_ref()?;
+    let is_same =
+        Path::new(given).canonicalize().ok().is_some_and(|given| own.canonicalize().is_ok_and(|own| own == given));
+    (!is_same).then(|| format!("--camera {given} is used; {} is not read", own.display()))
 }
 
 fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
@@ -110,12 +137,24 @@ fn camera(args: &SourceArgs, sequence: &Sequence) -> Result<CameraSource> {
     }
     complete_camera(&mut source, sequence)?;
     if args.camera.is_some()
+        && sequence.unread_calibration.is_none()
         && let Ok(own) = detect_camera(args.folder())
         && differs(&own, &source)
     {
         source.notes.push(format!("it is used, not the camera file of the folder, {}", own.origin));
     }
     Ok(source)
+}
+
+/// Describes in one line what the folder was taken for.
+fn recognised(sequence: &Sequence, camera: &CameraSource) -> String {
+    let (folder, layout, frames) = (sequence.folder.display(), sequence.layout.name(), sequence.entries.len());
+    let sensor = match sequence.depth_source {
+        DepthSource::Image => "RGB-D",
+        DepthSource::Stereo => "stereo",
+        DepthSource::Motion => "a single camera",
+    };
+    format!("{folder}: {layout}, {sensor}, {frames} frames; camera: {}", camera.origin)
 }
 
 /// Returns whether two calibrations differ in what both state.
@@ -184,6 +223,7 @@ fn reason(fault: &FrameFault) -> &'static str {
             DecodeError::WrongSize { .. } | DecodeError::TooLarge(_) => "wrong size of image",
             DecodeError::Damaged(_) => "damaged image",
         },
+        FrameFault::NotListed => "missing file",
         FrameFault::NoDepth { .. } => "no depth in any pixel",
         FrameFault::DecoderStopped => "decoder stopped",
     }

@@ -54,11 +54,13 @@ impl Masks {
         for entry in &sequence.entries {
             let recorded_ns = sequence.mirror.map_or(entry.timestamp_ns, |mirror| mirror.apply(entry.timestamp_ns));
             let named = |stem: &str| folder.join(format!("{stem}.png"));
-            let like_color =
-                entry.color_path.file_stem().map_or_else(PathBuf::new, |stem| named(&stem.to_string_lossy()));
+            let of_stamp = named(&format_stamp(recorded_ns));
+            // An image of a bag has no name of its own.
+            let stem = entry.color.file().map(|path| path.file_stem().unwrap_or_default().to_string_lossy());
+            let like_color = stem.map_or_else(|| of_stamp.clone(), |stem| named(&stem));
             let candidates = match &listed {
                 Some(listed) => vec![listed.get(&recorded_ns).cloned().unwrap_or_default()],
-                None => vec![like_color.clone(), named(&format_stamp(recorded_ns))],
+                None => vec![like_color.clone(), of_stamp],
             };
             match candidates.into_iter().find(|path| path.is_file()) {
                 Some(path) => _ = files.insert(entry.timestamp_ns, path),

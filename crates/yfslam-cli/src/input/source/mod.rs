@@ -3,6 +3,7 @@
 //! In: options of the user. Out: a [`Source`] for the SLAM system, and the ground truth, which the system does not get.
 
 mod args;
+mod bag;
 mod folder;
 mod frames;
 mod masks;
@@ -22,6 +23,7 @@ use yfslam_io::{CameraSource, TrajectoryFile};
 use crate::input::trajectory::checked_poses;
 use crate::ui::terminal::Terminal;
 pub use args::SourceArgs;
+pub use bag::describe as describe_bag;
 pub use folder::open_sequence;
 use frames::{Frames, Player};
 pub use masks::MaskTally;
@@ -31,6 +33,10 @@ pub use synth::world_camera;
 pub struct Source {
     /// Short name, for folders and tables.
     pub name: String,
+    /// What the sequence was taken for, and what was assumed, one sentence each.
+    pub notes: Vec<String>,
+    /// What is probably a mistake, one sentence each.
+    pub warnings: Vec<String>,
     /// The camera, checked.
     pub camera: CameraSource,
     /// Where depth comes from.

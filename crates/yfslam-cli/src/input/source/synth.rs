@@ -65,6 +65,8 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
     let renderer = Renderer::start(world, part.clone(), classes)?;
     Ok(Source {
         name: name.into(),
+        notes: Vec::new(),
+        warnings: Vec::new(),
         camera: world_camera(&config),
         mirror: part.mirror,
         depth_source,
