@@ -108,7 +108,7 @@ pub fn run(args: &SynthArgs, terminal: Terminal) -> Result<()> {
     let truth = |index| StampedPose::new(world.timestamp_ns(index), world.pose(index));
     writer.finish(&config.camera, config.depth_factor, &(0..world.len()).map(truth).collect::<Vec<_>>(), &boxes)?;
     terminal.result(&format!(
-        "{} frames of {} px × {} px, people cover {:.0} % of the image; written to {}\n",
+        "{} frames of {} px × {} px, what moves covers {:.0} % of the image; written to {}\n",
         world.len(),
         config.camera.width,
         config.camera.height,

@@ -76,9 +76,11 @@ pub fn evaluate_possible(
 /// Deviation of the scale from 1 above which it is reported.
 const MAX_SCALE_ERROR: f64 = 0.1;
 
-/// Matches and size of the error, relative to the path, with which a scale means something.
+/// Number of matches from which on a scale means something.
 const MIN_MATCHES: usize = 20;
-const MAX_ERROR_SHARE: f64 = 0.1;
+/// The error that the scale removes, as a multiple of the error that remains, from which on the scale is not that of noise: over a short
+/// path it is uncertain by some tenths.
+const MIN_SCALE_ERROR_SHARE: f64 = 2.0;
 
 /// Common depth units per metre.
 const FACTORS: [f64; 9] = [1.0, 100.0, 256.0, 1000.0, 4000.0, 5000.0, 5208.0, 6553.5, 10_000.0];
@@ -102,8 +104,8 @@ pub fn scale_warning(evaluation: &Evaluation, source: ScaleSource) -> Option<Str
     let errors = [evaluation.ate, evaluation.beside?].map(|ate| ate.translation_m.rmse);
     let [smaller, larger] =
         [errors.iter().copied().fold(f64::MAX, f64::min), errors.iter().copied().fold(0.0, f64::max)];
-    // Without the scale the error must be much larger, or the scale is that of noise.
-    let is_certain = evaluation.matches >= MIN_MATCHES && smaller <= larger * (1.0 - MAX_ERROR_SHARE);
+    let removed = (larger * larger - smaller * smaller).sqrt();
+    let is_certain = evaluation.matches >= MIN_MATCHES && removed >= MIN_SCALE_ERROR_SHARE * smaller;
     if !is_certain || (1.0 - MAX_SCALE_ERROR..=1.0 / (1.0 - MAX_SCALE_ERROR)).contains(&scale) {
         return None;
     }

@@ -97,11 +97,13 @@ fn no_person_or_moved_object_of_the_suite_comes_closer_to_the_camera_than_35_cm(
 }
 
 #[test]
-fn people_cover_a_twentieth_of_the_image_in_every_world_of_the_suite() {
+fn actors_cover_a_twentieth_of_the_image_in_every_world_of_the_suite() {
     for name in crate::names() {
         for form in ["seed=1&frames=150", "seed=2"] {
             let world = World::new(&crate::parse(&format!("{name}?{form}")).unwrap()).unwrap();
-            assert!(world.person_share() > 0.05, "{name}?{form}: {}", world.person_share());
+            // A laptop alone is small.
+            let least = if world.config().people > 0 { 0.05 } else { 0.03 };
+            assert!(world.person_share() > least, "{name}?{form}: {}", world.person_share());
         }
     }
 }
