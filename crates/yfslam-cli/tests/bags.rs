@@ -76,6 +76,9 @@ fn a_bag_gives_the_trajectory_of_a_folder_and_its_own_camera_and_ground_truth() 
     }
     let backward = ["--camera", camera_file, "--reverse", "--start", "2", "--end", "9"];
     assert!(run("a.bag", &backward) == run("tum", &backward[2..]));
+    for sequence in ["tum", "synth:walking_xyz"] {
+        fails(folder.path(), &["run", sequence, "--color-topic", "/x"], &["no topics", "--color-topic"]);
+    }
 }
 
 #[test]

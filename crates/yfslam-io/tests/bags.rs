@@ -331,6 +331,11 @@ fn a_calibration_that_changes_the_image_is_refused_by_the_name_of_what_is_not_su
     });
     let sequence = read("a.mcap", &five, &options()).unwrap().0;
     assert_eq!(sequence.calibration.unwrap().camera.camera.distortion[..5], [0.01, 0.02, 0.0, 0.0, 0.03]);
+    let d = [0.5, -0.3, 0.001, 0.002, 0.02, 0.4, -0.2, 0.01];
+    let eight = with(&|info| (info.distortion_model, info.d) = ("rational_polynomial".into(), d.to_vec()));
+    let camera = read("a.mcap", &eight, &options()).unwrap().0.calibration.unwrap().camera.camera;
+    assert_eq!((&camera.distortion[..], &camera.rational[..]), (&d[..5], &d[5..]));
+    names(with(&|info| info.d = vec![0.01; 12]), &["12 parameters", "8 are supported"]);
 }
 
 #[test]

@@ -163,6 +163,9 @@ impl SourceArgs {
         if self.masks.is_some() {
             bail!("masks belong to the images of a folder; write the world with `yfslam synth` to run it with --masks");
         }
+        if !self.bag.choice().is_empty() {
+            bail!("a synthetic world has no topics; leave out --color-topic and the like");
+        }
         let (camera, depth_factor) = match &self.camera {
             Some(spec) => load_camera(spec, None).map(|source| (source.camera, source.depth_factor))?,
             None => (default_camera(), WorldConfig::default().depth_factor),

@@ -10,6 +10,7 @@ use yfslam::{Detection, Frame};
 use yfslam_io::boxes::KnownDetections;
 use yfslam_io::camera::check_camera;
 use yfslam_io::decode::DecodeError;
+use yfslam_io::sequence::Layout;
 use yfslam_io::stream::DEFAULT_LOOK_AHEAD;
 use yfslam_io::{
     BoxList, CameraSource, DepthStatistics, Error, FrameFault, FrameStream, Sequence, SequenceOptions, check_recording,
@@ -108,6 +109,11 @@ pub fn open_sequence(args: &SourceArgs, configured: DepthSource) -> Result<(Sequ
         topics: args.bag.choice(),
     };
     let sequence = Sequence::open(args.folder(), &options)?;
+    ensure!(
+        options.topics.is_empty() || sequence.layout == Layout::Bag,
+        "{} is no bag and has no topics; leave out --color-topic and the like",
+        args.sequence
+    );
     let camera = camera(args, &sequence);
     Ok((sequence, camera))
 }

@@ -142,14 +142,16 @@ fn camera_of(info: &CameraInfo, is_rectified: bool) -> std::result::Result<Camer
     if fx == 0.0 {
         return Err(("K is all zeros: the camera was not calibrated".into(), "give the calibration with --camera"));
     }
-    Ok(Camera::pinhole(width, height, fx, fy, cx, cy).with_distortion(distortion(info)?))
+    let (distortion, rational) = distortion(info)?;
+    let camera = Camera::pinhole(width, height, fx, fy, cx, cy);
+    Ok(camera.with_distortion(distortion).with_rational_distortion(rational))
 }
 
-/// Returns k1, k2, p1, p2, k3.
-fn distortion(info: &CameraInfo) -> std::result::Result<[f64; 5], Refusal> {
+/// Returns k1, k2, p1, p2, k3, and k4, k5, k6 of the rational model.
+fn distortion(info: &CameraInfo) -> std::result::Result<([f64; 5], [f64; 3]), Refusal> {
     let model = info.distortion_model.as_str();
     if info.d.iter().all(|&d| d == 0.0) {
-        return Ok([0.0; 5]);
+        return Ok(([0.0; 5], [0.0; 3]));
     }
     match model {
         "plumb_bob" | "radtan" | "rational_polynomial" | "Brown Conrady" | "" => {}
@@ -163,18 +165,11 @@ fn distortion(info: &CameraInfo) -> std::result::Result<[f64; 5], Refusal> {
         }
     }
     let parameter = |index: usize| info.d.get(index).copied().unwrap_or(0.0);
-    for (index, name) in ["k4", "k5", "k6"].iter().enumerate() {
-        if parameter(5 + index) != 0.0 {
-            let problem =
-                format!("{name} is {}, and the rational model of distortion is not supported", parameter(5 + index));
-            return Err((problem, "record rectified images (image_proc, topic image_rect)"));
-        }
-    }
     if info.d.iter().skip(8).any(|&d| d != 0.0) {
-        let problem = format!("D has {} parameters, of which 5 are supported", info.d.len());
+        let problem = format!("D has {} parameters, of which 8 are supported", info.d.len());
         return Err((problem, "record rectified images (image_proc, topic image_rect)"));
     }
-    Ok([0, 1, 2, 3, 4].map(parameter))
+    Ok(([0, 1, 2, 3, 4].map(parameter), [5, 6, 7].map(parameter)))
 }
 
 /// Returns the pose of a camera in the frame of the rectified left camera; `x_m` is where it is on the baseline.
