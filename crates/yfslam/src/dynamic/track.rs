@@ -38,13 +38,14 @@ pub(crate) struct Track {
     pub depth_age: usize,
     /// Whether it was found to show no object; the next update removes it.
     pub ended: bool,
-    /// Whether it is an object that no detector has found: it was opened because it moves, and ends when it stands still.
+    /// Whether it is an object that no detector has found: it was opened because it moves.
     pub is_unknown: bool,
     /// Highest score of its detections.
     best_score: f32,
     /// Log-odds that it moves by what its features have shown.
     evidence: f32,
-    /// Frames since its last detection in which the detector processed the image.
+    /// Frames since its last detection in which the detector processed the image; of an object that no detector has found, frames since it
+    /// has moved.
     pub(super) missed_searches: usize,
     /// Velocity of the centre of the box, px per frame.
     velocity: [f32; 2],

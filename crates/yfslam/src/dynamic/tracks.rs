@@ -10,8 +10,8 @@ use crate::dynamic::track::Track;
 
 /// Overlap from which on a moving object that no detector has found is that of a track. Source: chosen: half.
 const SAME_UNKNOWN: f32 = 0.5;
-/// Frames after which the track of such an object ends if nothing shows that it moves. Source: chosen: one second.
-const MAX_UNKNOWN_FRAMES: usize = 30;
+/// Frames for which such an object is remembered after it has moved. Source: chosen: ten seconds; what is put down is often fetched again.
+const MAX_UNKNOWN_FRAMES: usize = 300;
 
 /// All tracks, in the order in which they were opened.
 #[derive(Clone, Debug, Default)]

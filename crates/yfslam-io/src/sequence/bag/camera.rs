@@ -144,7 +144,9 @@ fn camera_of(info: &CameraInfo, is_rectified: bool) -> std::result::Result<Camer
     }
     let (distortion, rational) = distortion(info)?;
     let camera = Camera::pinhole(width, height, fx, fy, cx, cy);
-    Ok(camera.with_distortion(distortion).with_rational_distortion(rational))
+    let mut camera = camera.with_distortion(distortion);
+    camera.rational = rational;
+    Ok(camera)
 }
 
 /// Returns k1, k2, p1, p2, k3, and k4, k5, k6 of the rational model.

@@ -148,7 +148,6 @@ impl Full {
             if let (Some(_), Some(share)) = (shares[0], least) {
                 track.add_evidence(config, share, recent.gap_s);
             }
-            track.ended |= track.is_unknown && track.stands_still();
         }
     }
 

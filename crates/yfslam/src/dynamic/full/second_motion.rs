@@ -76,7 +76,8 @@ impl SecondMotion {
         if found.pose_follows_object { (&self.first, &self.second) } else { (&self.second, &self.first) }
     }
 
-    /// Searches a second motion among the candidates; `is_on_object` tells which features lie on an object that is known to move.
+    /// Searches a second motion among the candidates; `is_on_object` tells which features lie on an object that has
+    /// moved before.
     pub(super) fn search(
         &mut self,
         config: &FullConfig,
@@ -93,9 +94,11 @@ impl SecondMotion {
         if self.second.len() < config.second_motion_min_features {
             return None;
         }
-        let on_object = self.second.iter().filter(|i| is_on_object(**i)).count();
-        if 2 * on_object > self.second.len() {
-            return Some(Found { pose_follows_object: false, is_open: false });
+        // What has moved before is not the world, whatever its size.
+        let is_known = |group: &[u32]| 2 * group.iter().filter(|i| is_on_object(**i)).count() > group.len();
+        let [first_moved, second_moved] = [&self.first, &self.second].map(|group| is_known(group));
+        if first_moved != second_moved {
+            return Some(Found { pose_follows_object: first_moved, is_open: false });
         }
         let Self { first, second, sorted, .. } = self;
         let mut weight = |group: &[u32]| {
