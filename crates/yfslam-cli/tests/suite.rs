@@ -89,6 +89,16 @@ fn where_people_sit_the_filter_changes_the_error_by_2_mm_at_most_or_a_tenth() {
 }
 
 #[test]
+fn a_box_that_no_detector_knows_and_that_covers_most_of_the_image_does_not_take_the_pose_along() {
+    let folder = tempfile::tempdir().unwrap();
+    let cells = bench(folder.path(), &[format!("obstructing_box?{SMALL}")], "none,full", LONG_FRAMES, "b");
+    let error =
+        |method: &str| cells.iter().find(|cell| cell["method"] == method).unwrap()["ate_rmse_m"].as_f64().unwrap();
+    assert!(error("none") > 0.2 && error("full") < 0.05, "{cells:#?}");
+    assert!(cells.iter().all(|cell| cell["tracked"] == 1.0), "{cells:#?}");
+}
+
+#[test]
 fn a_world_gives_the_same_results_on_every_run() {
     let folder = tempfile::tempdir().unwrap();
     let figures = |out: &str| -> Vec<[Value; 4]> {
