@@ -237,11 +237,19 @@ impl Search<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::camera::Camera;
     use crate::config::Config;
     use crate::map::Map;
+
+    /// Returns the descriptor of a feature: those of different features differ in about half of the bits.
+    pub(in crate::dynamic::full) fn descriptor(i: u32) -> Descriptor {
+        Descriptor([1u64, 2, 3, 4].map(|k| {
+            let bits = (u64::from(i) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_mul(2 * k + 1);
+            (bits ^ (bits >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
+        }))
+    }
 
     /// Returns features of a wall 2 m away, and beside them those of an instance, right of column 400, that has moved by `step_px`.
     fn features(sensor: &SensorModel, step_px: f32) -> FrameFeatures {
@@ -250,13 +258,6 @@ mod tests {
             let [x, v] = place(i);
             let u = if x > 400.0 { x + step_px } else { x };
             Feature { raw: [u, v], u, v, octave: 0, angle_rad: 0.0, depth_m: Some(2.0), trust: 1.0 }
-        };
-        // Different features have descriptors that differ in about half of the bits.
-        let descriptor = |i: u32| {
-            Descriptor([1u64, 2, 3, 4].map(|k| {
-                let bits = (u64::from(i) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_mul(2 * k + 1);
-                (bits ^ (bits >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
-            }))
         };
         FrameFeatures::from_parts((0..300).map(feature).collect(), (0..300).map(descriptor).collect(), sensor.bounds)
     }

@@ -235,7 +235,7 @@ mod tests {
     use crate::camera::Camera;
     use crate::config::Config;
     use crate::context::SensorModel;
-    use crate::features::Descriptor;
+    use crate::dynamic::full::displacement::tests::descriptor;
 
     /// Returns the features of a room 3 m away and, in the middle of the image, of an object 1.5 m away that is shifted by that many pixels.
     fn features(sensor: &SensorModel, shift_px: f32) -> FrameFeatures {
@@ -246,12 +246,6 @@ mod tests {
             let (u, z) = if is_object { (u + shift_px, 1.5) } else { (u, 3.0 + 0.01 * (i % 7) as f32) };
             all.push(Feature { raw: [u, v], u, v, octave: 0, angle_rad: 0.0, depth_m: Some(z), trust: 1.0 });
         }
-        let descriptor = |i: u32| {
-            Descriptor([1u64, 2, 3, 4].map(|k| {
-                let bits = (u64::from(i) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_mul(2 * k + 1);
-                (bits ^ (bits >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
-            }))
-        };
         FrameFeatures::from_parts(all, (0..480).map(descriptor).collect(), sensor.bounds)
     }
 
