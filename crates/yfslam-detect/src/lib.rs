@@ -21,6 +21,7 @@
 //! With the feature `rten`, `AnyYolo` runs YOLO networks of other architectures, more slowly and on all cores; [`load()`] chooses
 //! between them by the file.
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 #[cfg(feature = "rten")]
 mod any_yolo;

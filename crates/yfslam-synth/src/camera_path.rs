@@ -84,7 +84,7 @@ impl CameraPath {
     /// Returns the pose (world from camera) at `time` seconds.
     pub fn pose(&self, time: f64) -> Isometry3<f64> {
         let [x, y, z, roll, pitch, yaw] = self.shake.map(|sines| {
-            sines.iter().map(|[amplitude, omega, phase]| amplitude * (omega * time + phase).sin()).sum::<f64>()
+            sines.iter().map(|[amplitude, omega, phase]| amplitude * libm::sin(omega * time + phase)).sum::<f64>()
         });
         let shake = Isometry3::new(Vector3::new(x, y, z), Vector3::new(pitch, yaw, roll));
         match &self.tour {

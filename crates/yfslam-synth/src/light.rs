@@ -181,7 +181,7 @@ pub fn hemisphere(normal: &Vec3, s: f32, t: f32) -> Vec3 {
     let axis = if normal.z.abs() < 0.7 { Vec3::z() } else { Vec3::x() };
     let a = normal.cross(&axis).normalize();
     let b = normal.cross(&a);
-    let (sin, cos) = (t * std::f32::consts::TAU).sin_cos();
+    let (sin, cos) = libm::sincosf(t * std::f32::consts::TAU);
     let r = s.sqrt();
     a * (r * cos) + b * (r * sin) + normal * (1.0 - s).max(0.0).sqrt()
 }

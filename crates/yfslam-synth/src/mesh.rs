@@ -119,7 +119,7 @@ impl Mesh {
         self.grid(segments, last as u32, patch, |u, v| {
             let j = (v * last as f32).round() as usize;
             // u = 0 and u = 1 must be the same point to the bit, or the seam would be visible.
-            let (sin, cos) = if u >= 1.0 { (0.0, 1.0) } else { (u * std::f32::consts::TAU).sin_cos() };
+            let (sin, cos) = if u >= 1.0 { (0.0, 1.0) } else { libm::sincosf(u * std::f32::consts::TAU) };
             let [z, rx, ry] = ring(j);
             let (above, below) = (ring(j.saturating_sub(1)), ring(j + 1));
             let (dz, dr) = (above[0] - below[0], (below[1] + below[2] - above[1] - above[2]) / 2.0);

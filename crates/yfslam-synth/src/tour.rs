@@ -106,7 +106,7 @@ impl Tour {
     /// Returns the length of one round, m.
     pub fn length(&self) -> f64 {
         let points = self.ticks.iter().zip(self.ticks.iter().cycle().skip(1));
-        points.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum()
+        points.map(|(a, b)| libm::hypot(a[0] - b[0], a[1] - b[1])).sum()
     }
 
     /// Returns the time at which the circuit is nearest to `place`, s.
@@ -172,11 +172,11 @@ fn view_directions(route: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 fn angle_between(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] * b[1] - a[1] * b[0]).abs().asin()
+    libm::asin((a[0] * b[1] - a[1] * b[0]).abs())
 }
 
 #[cfg(test)]

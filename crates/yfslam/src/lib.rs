@@ -80,6 +80,7 @@
 //! of the first keyframe. Lengths are metres (of a single camera: in a unit of its own), times integer nanoseconds. [`nalgebra`] is
 //! re-exported.
 #![deny(unreachable_pub)]
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![warn(missing_docs)]
 
 mod backend;

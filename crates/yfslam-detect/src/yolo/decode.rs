@@ -72,7 +72,7 @@ impl Grid {
     pub(crate) fn candidates(&self, plan: &Plan, threshold: f32, out: &mut Vec<Detection>) {
         let [boxes, objects, classes] = self.maps.map(|index| &plan.outputs[index]);
         // σ(x) > t is x > ln(t / (1 − t)): this avoids the exponential for the many empty cells.
-        let least = (threshold / (1.0 - threshold)).ln();
+        let least = libm::logf(threshold / (1.0 - threshold));
         for (index, anchor) in self.anchors.iter().enumerate() {
             for (cell, object) in plan.plane(objects, index).iter().enumerate() {
                 if *object > least {
@@ -105,11 +105,11 @@ fn best_class(plan: &Plan, classes: &Map, cell: usize) -> (usize, f32) {
             (best, most) = (class, logit);
         }
     }
-    (best, 1.0 / logits().map(|logit| (logit - most).exp()).sum::<f32>())
+    (best, 1.0 / logits().map(|logit| libm::expf(logit - most)).sum::<f32>())
 }
 
 fn sigmoid(x: f32) -> f32 {
-    1.0 / (1.0 + (-x).exp())
+    1.0 / (1.0 + libm::expf(-x))
 }
 
 /// Moves the best candidates to `out`, best first, except those that overlap a better one of their class.

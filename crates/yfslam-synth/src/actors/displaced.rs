@@ -45,7 +45,11 @@ impl DisplacedBox {
             let at = place.position;
             let away = rng.range(0.0, std::f32::consts::TAU);
             let from = upright([at.x, at.y], at.z, rng.range(-0.6, 0.6));
-            let to = upright([at.x + MOVED_M * away.cos(), at.y + MOVED_M * away.sin()], at.z, rng.range(-0.6, 0.6));
+            let to = upright(
+                [at.x + MOVED_M * libm::cosf(away), at.y + MOVED_M * libm::sinf(away)],
+                at.z,
+                rng.range(-0.6, 0.6),
+            );
             let seen = |pose: &Isometry3<f32>, view: &Isometry3<f64>| {
                 let middle = pose.translation.vector + Vec3::z() * (BOX_M[2] / 2.0);
                 in_view(&config.camera, view, &middle, f64::from(radius))

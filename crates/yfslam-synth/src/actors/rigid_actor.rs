@@ -201,7 +201,7 @@ fn track(b: &mut Builder, x: f32, length: f32, height: f32, width: f32) {
         let route = u * perimeter;
         let arc = PI * radius;
         let wheel = |middle: f32, angle: f32| {
-            let (sin, cos) = angle.sin_cos();
+            let (sin, cos) = libm::sincosf(angle);
             ([middle + radius * cos, radius + radius * sin], [cos, sin])
         };
         if route < straight {

@@ -92,8 +92,8 @@ pub fn route(scene: &Scene, config: &WorldConfig, path: &CameraPath, k: usize, c
 /// Returns the route of number `place` of those ahead of the camera on its tour; a larger closeness gives a smaller distance.
 fn ahead(config: &WorldConfig, tour: &Tour, place: usize, closeness: f64) -> TourWalker {
     let mut draw = Rng::new(config.seed, 0xc0a1);
-    let [far, near] = LEAD_M.map(f64::ln);
-    let lead_m = (far + (near - far) * closeness / 2.0).exp();
+    let [far, near] = LEAD_M.map(libm::log);
+    let lead_m = libm::exp(far + (near - far) * closeness / 2.0);
     let pace = tour.length() / tour.period();
     // The paces of all vary in the same way, so that they never collide.
     let waver = [WAVER * lead_m / pace, WAVER_RATE, draw.range64(0.0, std::f64::consts::TAU)];
@@ -157,7 +157,7 @@ fn lane(scene: &Scene, config: &WorldConfig, k: usize, closeness: f64) -> Walkwa
     let mut draw = Rng::new(config.seed, 0x5c4e);
     let (clockwise, speed) = (draw.chance(0.5), draw.range64(0.75, 1.0));
     let onwards = if clockwise { -1.0 } else { 1.0 };
-    let stroll = speed * STROLL.powf(closeness);
+    let stroll = speed * libm::pow(STROLL, closeness);
     let going = walkers(scene, config) + config.actors.robots;
     let in_lane = going.div_ceil(2).clamp(1, 3);
     let ahead = AHEAD_M * (0.5 - lane as f64);

@@ -50,14 +50,14 @@ impl TourWalker {
     /// Returns the place of the walker at `time` seconds.
     pub fn at(&self, time: f64) -> Step {
         let [size, omega, phase] = self.manner.waver;
-        let table = self.manner.start_s + self.manner.rate * time + size * (omega * time + phase).sin();
-        let rate = self.manner.rate + size * omega * (omega * time + phase).cos();
+        let table = self.manner.start_s + self.manner.rate * time + size * libm::sin(omega * time + phase);
+        let rate = self.manner.rate + size * omega * libm::cos(omega * time + phase);
         let (place, along) = beside(&self.tour, table, self.manner.beside_m);
         let onwards = along * rate.signum();
         let slope = (self.length(table + SAMPLE_S) - self.length(table - SAMPLE_S)) / (2.0 * SAMPLE_S);
         Step {
             position: [place.x, place.y],
-            heading: (-onwards.x).atan2(onwards.y),
+            heading: libm::atan2(-onwards.x, onwards.y),
             glance: 0.0,
             distance: self.length(table) * rate.signum(),
             speed: slope * rate.abs(),

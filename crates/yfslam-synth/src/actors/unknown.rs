@@ -90,7 +90,7 @@ impl UnknownMotion {
         };
         let forward = (camera.rotation * nalgebra::Vector3::z()).cast::<f32>();
         let at = camera.translation.vector.cast::<f32>();
-        Self { keys, base: upright([at.x, at.y], 0.0, (-forward.x).atan2(forward.y)), moves }
+        Self { keys, base: upright([at.x, at.y], 0.0, libm::atan2f(-forward.x, forward.y)), moves }
     }
 
     /// Returns the pose at `time` seconds: the middle of its bottom, or the lower end of the hinge of a door.

@@ -178,7 +178,7 @@ impl Walkway {
         let (a, b) = (self.point((along - 0.2).rem_euclid(total)), self.point((along + 0.2).rem_euclid(total)));
         let sign = if self.clockwise { -1.0 } else { 1.0 };
         let (dx, dy) = (sign * (b[0] - a[0]), sign * (b[1] - a[1]));
-        (position, (-dx).atan2(dy))
+        (position, libm::atan2(-dx, dy))
     }
 
     fn point(&self, along: f64) -> [f64; 2] {
@@ -218,7 +218,7 @@ fn profile(t: f64) -> (f64, f64) {
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 fn catmull_rom(p: [[f64; 2]; 4], t: f64) -> [f64; 2] {

@@ -26,7 +26,7 @@ pub fn desk(b: &mut Builder, base: Vec3, width: f32, depth: f32, height: f32) {
 
 /// Adds a monitor that faces −y before it is turned by `yaw`; `base` is the place of its foot.
 pub fn monitor(b: &mut Builder, base: Vec3, yaw: f32) {
-    let (sin, cos) = yaw.sin_cos();
+    let (sin, cos) = libm::sincosf(yaw);
     let turned = |x: f32, y: f32, z: f32| base + Vec3::new(cos * x - sin * y, sin * x + cos * y, z);
     b.density = 400.0;
     b.cuboid(base, Vec3::new(0.24, 0.18, 0.015), yaw, |_| Material::Plain(DARK));
@@ -98,7 +98,7 @@ pub fn bookshelf(b: &mut Builder, base: Vec3, width: f32, height: f32, boards: u
 
 /// Adds an office chair whose sitter faces `yaw` (0 is +y); returns the middle of the top of the seat.
 pub fn chair(b: &mut Builder, base: Vec3, yaw: f32, color: [f32; 3]) -> Vec3 {
-    let (sin, cos) = yaw.sin_cos();
+    let (sin, cos) = libm::sincosf(yaw);
     let turned = |x: f32, y: f32, z: f32| base + Vec3::new(cos * x - sin * y, sin * x + cos * y, z);
     b.density = 400.0;
     let seat_z = 0.46;
@@ -108,9 +108,9 @@ pub fn chair(b: &mut Builder, base: Vec3, yaw: f32, color: [f32; 3]) -> Vec3 {
     b.turned(turned(0.0, 0.0, 0.08), &[[0.32, 0.03], [0.0, 0.03]], 10, Material::Plain(STEEL));
     for leg in 0..5 {
         let angle = yaw + leg as f32 * std::f32::consts::TAU / 5.0;
-        let at = base + Vec3::new(angle.cos(), angle.sin(), 0.0) * 0.15 + Vec3::z() * 0.06;
+        let at = base + Vec3::new(libm::cosf(angle), libm::sinf(angle), 0.0) * 0.15 + Vec3::z() * 0.06;
         b.cuboid(at, Vec3::new(0.30, 0.045, 0.03), angle, |_| Material::Plain(DARK));
-        let wheel = base + Vec3::new(angle.cos(), angle.sin(), 0.0) * 0.28;
+        let wheel = base + Vec3::new(libm::cosf(angle), libm::sinf(angle), 0.0) * 0.28;
         b.cuboid(wheel, Vec3::new(0.06, 0.04, 0.06), angle, |_| Material::Plain(DARK));
     }
     turned(0.0, 0.0, seat_z)
@@ -131,8 +131,9 @@ pub fn plant(b: &mut Builder, base: Vec3) {
     for leaf in 0..22 {
         let azimuth = leaf as f32 * 2.4 + b.rng.range(-0.3, 0.3);
         let (tilt, length) = (b.rng.range(0.15, 0.95), b.rng.range(0.22, 0.42));
-        let out = Vec3::new(azimuth.cos(), azimuth.sin(), 0.0);
-        let stem = out * (0.35 * tilt.sin()) + Vec3::z() * (0.45 + 0.55 * tilt.cos() * b.rng.range(0.6, 1.0));
+        let out = Vec3::new(libm::cosf(azimuth), libm::sinf(azimuth), 0.0);
+        let stem =
+            out * (0.35 * libm::sinf(tilt)) + Vec3::z() * (0.45 + 0.55 * libm::cosf(tilt) * b.rng.range(0.6, 1.0));
         let rings: Vec<[f32; 3]> = [(1.0, 0.0), (0.7, 0.6), (0.3, 1.0), (-0.3, 0.9), (-0.8, 0.4), (-1.0, 0.0)]
             .map(|(z, r)| [z * length / 2.0, 0.006 * r, 0.055 * r])
             .to_vec();

@@ -121,7 +121,7 @@ fn fallen(b: &mut Builder) {
 fn heap(b: &mut Builder, [x, y]: [f32; 2], radius: f32, height: f32, count: usize) {
     for k in 0..count {
         let (angle, far) = (b.rng.range(0.0, std::f32::consts::TAU), b.rng.range(0.0, 1.0).sqrt());
-        let at = [x + radius * far * angle.cos(), y + radius * far * angle.sin()];
+        let at = [x + radius * far * libm::cosf(angle), y + radius * far * libm::sinf(angle)];
         let largest = if k % 5 == 0 { 0.62 } else { 0.36 };
         let size = Vec3::from_fn(|_, _| b.rng.range(0.10, largest));
         if !is_free(at, 0.45 + 0.5 * size.max()) {
@@ -146,7 +146,7 @@ fn is_free(place: [f32; 2], margin: f32) -> bool {
     let off_round = sides.into_iter().all(|(a, b)| {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let t = (((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
-        (x - a[0] - t * dx).hypot(y - a[1] - t * dy) > margin
+        libm::hypot(x - a[0] - t * dx, y - a[1] - t * dy) > margin
     });
     off_round && (x.abs() > 2.5 + margin || y < -4.0 + margin || y > 0.45 + margin)
 }

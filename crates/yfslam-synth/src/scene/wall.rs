@@ -55,7 +55,7 @@ impl Wall {
 
     /// Returns the angle that turns the front (−y) of a box out of the wall.
     pub fn yaw(&self) -> f32 {
-        self.right.y.atan2(self.right.x)
+        libm::atan2f(self.right.y, self.right.x)
     }
 
     /// Returns the point `s` to the right, `z` up and `out` of the wall.

@@ -70,7 +70,7 @@ pub fn smear(
             // dy) while the shutter is open is found where s (dx, dy) / (1 - dy · line) is.
             let stretch = 1.0 / (1.0 - dy * motion.line).max(LEAST_STRETCH);
             let (dx, dy) = (dx * stretch, dy * stretch);
-            let length = dx.hypot(dy);
+            let length = libm::hypotf(dx, dy);
             if length > LEAST_PX {
                 *pixel = mean_along(color, width, [column as f32, row as f32], [dx, dy], length);
             }

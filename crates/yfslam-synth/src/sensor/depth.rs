@@ -22,7 +22,7 @@ pub fn measure(
     seed: u64,
 ) -> DepthImage {
     let (width, bf) = (camera.width, camera.bf as f32);
-    let least_cosine = sensor.max_angle_deg.to_radians().cos();
+    let least_cosine = libm::cosf(sensor.max_angle_deg.to_radians());
     let by_angle = sensor.max_angle_deg < 90.0 || sensor.depth_noise_angle > 0.0 || sensor.min_return > 0.0;
     let mut raw = Image::<u16>::new(width, camera.height);
     raw.data_mut().par_chunks_mut(width).zip(exact.depth.par_chunks(width)).enumerate().for_each(
@@ -79,7 +79,7 @@ fn cosine(depth: &[f32], rays: &RayTable, row: usize, column: usize) -> f32 {
 fn disturb(z: f32, bf: f32, cosine: f32, sensor: &SensorConfig, normal: f32) -> f32 {
     let mut sigma = sensor.depth_noise_m + sensor.depth_noise_growth * (z - 0.4).max(0.0).powi(2);
     if sensor.depth_noise_angle > 0.0 && cosine < STEEP_COSINE {
-        let angle = cosine.min(1.0).acos();
+        let angle = libm::acosf(cosine.min(1.0));
         let ratio = angle / (std::f32::consts::FRAC_PI_2 - angle).max(0.05);
         sigma += sensor.depth_noise_angle / z.sqrt() * ratio * ratio;
     }

@@ -47,7 +47,7 @@ impl Meter {
         let start = read(0);
         let settled = |step: usize| {
             let seen = WEIGHTS.iter().enumerate().map(|(age, weight)| weight * read(step.saturating_sub(age)));
-            (start / seen.sum::<f32>()).powf(self.strength).clamp(RANGE[0], RANGE[1])
+            libm::powf(start / seen.sum::<f32>(), self.strength).clamp(RANGE[0], RANGE[1])
         };
         // Interpolated between the gains of the last two readings, so that gains change without steps.
         let (step, part) = ((time / STEP_S).max(0.0) as usize, (time / STEP_S).max(0.0).fract() as f32);

@@ -21,7 +21,7 @@ fn crack(canvas: &mut Canvas, m: f32, color: Color, rng: &mut Rng) {
     for _ in 0..4 + rng.below(14) {
         angle += rng.range(-0.7, 0.7);
         let step = rng.range(0.02, 0.07) / m;
-        let to = [from[0] + step * angle.cos(), from[1] + step * angle.sin()];
+        let to = [from[0] + step * libm::cosf(angle), from[1] + step * libm::sinf(angle)];
         canvas.line(from, to, rng.range(0.002, 0.005) / m, color);
         from = to;
     }

@@ -202,7 +202,7 @@ fn wood(canvas: &mut Canvas, color: Color, m: f32, seed: u64) {
     let fields = [canvas.field(seed, step(1.1, 3.0), 3), canvas.field(seed ^ 1, step(14.0, 260.0), 2)];
     canvas.shade_with(fields, |x, y, _, [bend, fibre]| {
         let (s, t) = if along_x { (x * m, y * m) } else { (y * m, x * m) };
-        let rings = ((t * 38.0 + bend * 9.0) * std::f32::consts::TAU * 0.5).sin();
+        let rings = libm::sinf((t * 38.0 + bend * 9.0) * std::f32::consts::TAU * 0.5);
         let fibre = fibre - 0.5;
         let pore = if cell(seed ^ 2, s * 60.0, t * 500.0) > 0.97 { -0.25 } else { 0.0 };
         tint(color, 0.95 + 0.07 * rings + 0.18 * fibre + 0.2 * (bend - 0.5) + pore)

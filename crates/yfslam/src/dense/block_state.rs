@@ -21,7 +21,7 @@ pub(super) struct Steps {
 impl Steps {
     /// Converts the probabilities of a configuration.
     pub(super) fn new(config: &DenseConfig) -> Self {
-        let log_odds = |p: f32| ((p / (1.0 - p)).ln() * PER_UNIT).round() as i16;
+        let log_odds = |p: f32| (libm::logf(p / (1.0 - p)) * PER_UNIT).round() as i16;
         Self {
             hit: log_odds(config.p_hit),
             miss: log_odds(config.p_miss),

@@ -76,7 +76,7 @@ impl Classes {
         if class == 0 && !self.blocks.contains_key(&block) {
             return;
         }
-        let log_odds = |p: f32| (p / (1.0 - p)).ln();
+        let log_odds = |p: f32| libm::logf(p / (1.0 - p));
         let current =
             &mut self.blocks.entry(block).or_insert_with(|| vec![VoxelClass::default(); VOXELS])[index_in_block(voxel)];
         if current.class == 0 {

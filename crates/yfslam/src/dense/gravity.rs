@@ -62,8 +62,8 @@ pub(crate) fn of_dense_map(dense_map: &DenseMap) -> UnitQuaternion<f64> {
         let (a, b) = (center.cross(&side).normalize(), center.cross(&center.cross(&side)).normalize());
         for ring in 1..=3 {
             for step in 0..12 {
-                let (sin, cos) = (f64::from(step) * std::f64::consts::TAU / 12.0).sin_cos();
-                let tilt = (reach * f64::from(ring) / 3.0).tan();
+                let (sin, cos) = libm::sincos(f64::from(step) * std::f64::consts::TAU / 12.0);
+                let tilt = libm::tan(reach * f64::from(ring) / 3.0);
                 let up = (center + (a * cos + b * sin) * tilt).normalize();
                 if up.angle(&first) <= SEARCH_DEG.to_radians() {
                     let found = levelness(&points, &up);

@@ -44,7 +44,7 @@ impl GravityDirection {
         if self.frames < MIN_FRAMES || down.xy().norm() < MIN_DOWN {
             return 0;
         }
-        let roll = down.x.atan2(down.y).to_degrees();
+        let roll = libm::atan2(down.x, down.y).to_degrees();
         if roll.abs() > limit_deg { ((roll / STEP_DEG).round() * STEP_DEG) as i32 } else { 0 }
     }
 }
@@ -109,7 +109,7 @@ impl RollTransform {
         if roll_deg == 0 || image.data().is_empty() {
             return None;
         }
-        let (sin, cos) = (roll_deg as f32).to_radians().sin_cos();
+        let (sin, cos) = libm::sincosf((roll_deg as f32).to_radians());
         let [width, height] = [image.width(), image.height()].map(|side| side as f32);
         let turned_size = [width * cos.abs() + height * sin.abs(), width * sin.abs() + height * cos.abs()];
         let scale = (turned_size[0].max(turned_size[1]) / MAX_SIDE_PX).max(1.0);
@@ -163,7 +163,7 @@ impl RollTransform {
         let [mx, my] = self.copy_middle;
         let [x, y] = self.to_image([(x_min + x_max) / 2.0 - mx, (y_min + y_max) / 2.0 - my]);
         let [a, b] = [(x_max - x_min) / 2.0 * self.scale, (y_max - y_min) / 2.0 * self.scale];
-        let reach = [(a * self.cos).hypot(b * self.sin), (a * self.sin).hypot(b * self.cos)];
+        let reach = [libm::hypotf(a * self.cos, b * self.sin), libm::hypotf(a * self.sin, b * self.cos)];
         let clip = |at: f32, axis: usize| at.clamp(0.0, 2.0 * self.middle[axis]);
         BoundingBox {
             x_min: clip(x - reach[0], 0),

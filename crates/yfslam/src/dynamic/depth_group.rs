@@ -66,8 +66,8 @@ pub(crate) fn largest_ransac(sorted: &[f32], width_m: f32, rng: &mut Pcg32) -> O
         if best.is_none_or(|b| members > b.members) {
             best = Some(DepthGroup { near_m: sorted[start], far_m: sorted[end - 1], members });
             let ratio = members as f64 / n as f64;
-            needed =
-                ((1.0 - RANSAC_CONFIDENCE).ln() / (1.0 - ratio * ratio).max(1e-12).ln()).clamp(1.0, RANSAC_MAX_DRAWS);
+            needed = (libm::log(1.0 - RANSAC_CONFIDENCE) / libm::log((1.0 - ratio * ratio).max(1e-12)))
+                .clamp(1.0, RANSAC_MAX_DRAWS);
         }
     }
     best.or_else(|| largest_exact(sorted, width_m))

@@ -108,7 +108,7 @@ impl Track {
     /// Log-odds that it moves: by its detections and by what its features have shown.
     pub(crate) fn moving_log_odds(&self) -> f32 {
         let score = self.best_score.clamp(1.0 - MAX_PROBABILITY, MAX_PROBABILITY);
-        (score / (1.0 - score)).ln().max(MIN_PRIOR_LOG_ODDS) + self.evidence
+        libm::logf(score / (1.0 - score)).max(MIN_PRIOR_LOG_ODDS) + self.evidence
     }
 
     /// Returns whether it is more likely to stand still than to move.
@@ -123,7 +123,7 @@ impl Track {
 
     /// Returns the probability that it stands still.
     pub(crate) fn static_probability(&self) -> f32 {
-        1.0 / (1.0 + self.moving_log_odds().exp())
+        1.0 / (1.0 + libm::expf(self.moving_log_odds()))
     }
 
     /// Takes into account which share of its features, relative to that of the background, is where it was `gap_s` seconds before.

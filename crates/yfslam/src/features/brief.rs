@@ -168,7 +168,7 @@ fn look_up<S: Simd>(simd: S, blocks: &[[u8x64<S>; 2]; 8], points: &Points) -> u8
 
 /// Rotates the test pairs by `angle_rad` and rounds them to pixels.
 fn rotated(angle_rad: f32) -> Pattern {
-    let (sin, cos) = angle_rad.sin_cos();
+    let (sin, cos) = libm::sincosf(angle_rad);
     let position = |[u, v]: [i8; 2]| {
         let (u, v) = (f32::from(u), f32::from(v));
         let [column, row] =

@@ -35,8 +35,8 @@ pub(crate) fn fundamental_ransac(
             best = Some((inliers, f));
             let share = inliers as f64 / pairs.len() as f64;
             // Without inliers the logarithm is 0; the bounds keep the quotient finite and positive.
-            let per_draw = (-share.powi(8).min(1.0 - 1e-12)).ln_1p().min(-1e-12);
-            needed = ((1.0 - confidence).ln() / per_draw).clamp(1.0, MAX_DRAWS);
+            let per_draw = libm::log1p(-share.powi(8).min(1.0 - 1e-12)).min(-1e-12);
+            needed = (libm::log(1.0 - confidence) / per_draw).clamp(1.0, MAX_DRAWS);
         }
     }
     let (_, f) = best?;
@@ -48,7 +48,7 @@ pub(crate) fn fundamental_ransac(
 /// Returns the distance of the second position from the epipolar line of the first, px.
 pub(crate) fn epipolar_distance(f: &Matrix3<f64>, ([x1, y1], [x2, y2]): &Pair) -> f64 {
     let line = f * Vector3::new(f64::from(*x1), f64::from(*y1), 1.0);
-    let length = line.x.hypot(line.y);
+    let length = libm::hypot(line.x, line.y);
     (line.x * f64::from(*x2) + line.y * f64::from(*y2) + line.z).abs() / length.max(1e-12)
 }
 
@@ -97,7 +97,7 @@ fn normalisation(positions: impl Iterator<Item = [f32; 2]> + Clone) -> Option<Ma
     let count = positions.clone().count() as f64;
     let (sx, sy) = positions.clone().fold((0.0, 0.0), |(x, y), p| (x + f64::from(p[0]), y + f64::from(p[1])));
     let (mx, my) = (sx / count, sy / count);
-    let spread: f64 = positions.map(|p| (f64::from(p[0]) - mx).hypot(f64::from(p[1]) - my)).sum::<f64>() / count;
+    let spread: f64 = positions.map(|p| libm::hypot(f64::from(p[0]) - mx, f64::from(p[1]) - my)).sum::<f64>() / count;
     let s = std::f64::consts::SQRT_2 / spread;
     (spread > 1e-9).then(|| Matrix3::new(s, 0.0, -s * mx, 0.0, s, -s * my, 0.0, 0.0, 1.0))
 }

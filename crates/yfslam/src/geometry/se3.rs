@@ -22,7 +22,7 @@ pub(crate) fn se3_exp(xi: &Vector6<f64>) -> Isometry3<f64> {
     let (a, b) = if theta < SMALL_ANGLE {
         (0.5 - theta2 / 24.0, 1.0 / 6.0 - theta2 / 120.0)
     } else {
-        ((1.0 - theta.cos()) / theta2, (theta - theta.sin()) / (theta2 * theta))
+        ((1.0 - libm::cos(theta)) / theta2, (theta - libm::sin(theta)) / (theta2 * theta))
     };
     let cross = phi.cross(&rho);
     let t = rho + cross * a + phi.cross(&cross) * b;
@@ -46,7 +46,7 @@ pub(crate) fn se3_log(pose: &Isometry3<f64>) -> Vector6<f64> {
     let c = if theta < SMALL_ANGLE {
         1.0 / 12.0 + theta2 / 720.0
     } else {
-        1.0 / theta2 - (1.0 + theta.cos()) / (2.0 * theta * theta.sin())
+        1.0 / theta2 - (1.0 + libm::cos(theta)) / (2.0 * theta * libm::sin(theta))
     };
     let t = pose.translation.vector;
     let cross = phi.cross(&t);

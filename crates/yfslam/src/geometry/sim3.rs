@@ -44,13 +44,13 @@ pub(crate) fn with_scale(t_cam_world: &Pose, scale: f64) -> Similarity {
 
 /// Returns the similarity with these tangent coordinates. It agrees with the exponential map to first order, and exactly if σ is 0.
 pub(crate) fn sim3_from_tangent(xi: &Tangent) -> Similarity {
-    let scale = xi[6].clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE).exp();
+    let scale = libm::exp(xi[6].clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE));
     Similarity::from_isometry(se3_exp(&xi.fixed_rows::<6>(0).into_owned()), scale)
 }
 
 /// Returns the tangent coordinates of a similarity: the inverse of [`sim3_from_tangent`].
 pub(crate) fn sim3_tangent(s: &Similarity) -> Tangent {
-    se3_log(&s.isometry).push(s.scaling().ln())
+    se3_log(&s.isometry).push(libm::log(s.scaling()))
 }
 
 /// Returns a similarity after a left perturbation, with its quaternion normalised as in [`super::perturbed`].

@@ -25,10 +25,10 @@ pub(super) fn is_plausible(
     let Some(path_m) = path_length_m(map, from, to) else { return false };
     let motion = drift.isometry;
     let (shift_m, turn_deg) = (motion.translation.vector.norm(), motion.rotation.angle().to_degrees());
-    let scale = drift.scaling().ln().abs();
+    let scale = libm::log(drift.scaling()).abs();
     shift_m <= config.max_drift_m + config.max_drift_m_per_m * path_m
         && turn_deg <= config.max_drift_deg + config.max_drift_deg_per_m * path_m
-        && scale <= (config.max_drift_scale + config.max_drift_scale_per_m * path_m).ln_1p()
+        && scale <= libm::log1p(config.max_drift_scale + config.max_drift_scale_per_m * path_m)
 }
 
 /// Returns the length of the shortest path between two keyframes over covisible keyframes, parents, children and loop edges:

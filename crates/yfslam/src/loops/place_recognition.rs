@@ -117,7 +117,7 @@ impl PlaceRecogniser {
                     self.voted.push(*id);
                 }
             }
-            let weight = (1.0 + keyframes / self.voted.len() as f64).ln();
+            let weight = libm::log(1.0 + keyframes / self.voted.len() as f64);
             for &id in &self.voted {
                 self.votes[id].score += weight;
             }

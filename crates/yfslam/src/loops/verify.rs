@@ -193,7 +193,7 @@ pub(super) fn ransac<M: Copy, I: IntoIterator<Item = M>>(
             if best.as_ref().is_none_or(|(most, _)| inliers > *most) {
                 best = Some((inliers, model));
                 let share = inliers as f64 / count as f64;
-                let needed = (1.0 - config.ransac_confidence).ln() / (1.0 - share.powi(3)).max(1e-9).ln();
+                let needed = libm::log(1.0 - config.ransac_confidence) / libm::log((1.0 - share.powi(3)).max(1e-9));
                 draws = draws.min(needed.ceil().max(1.0));
             }
         }

@@ -51,7 +51,7 @@ impl Landmark {
 
     /// Returns the probability that the landmark still exists, divided by the largest such probability, in [0, 1].
     pub(crate) fn trust(&self) -> f32 {
-        (1.0 + (-Self::MAX_EXISTENCE_LOG_ODDS).exp()) / (1.0 + (-self.existence_log_odds).exp())
+        (1.0 + libm::expf(-Self::MAX_EXISTENCE_LOG_ODDS)) / (1.0 + libm::expf(-self.existence_log_odds))
     }
 
     /// Returns the share of matched frames among the frames in which the landmark was expected to be visible.

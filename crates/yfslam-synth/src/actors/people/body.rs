@@ -252,7 +252,7 @@ impl Tailor<'_> {
 pub fn ellipsoid([rx, ry, rz]: [f32; 3]) -> Vec<[f32; 3]> {
     (0..=8)
         .map(|i| {
-            let (sin, cos) = (i as f32 * std::f32::consts::PI / 8.0).sin_cos();
+            let (sin, cos) = libm::sincosf(i as f32 * std::f32::consts::PI / 8.0);
             let sin = if i == 0 || i == 8 { 0.0 } else { sin };
             [rz * cos, rx * sin, ry * sin]
         })

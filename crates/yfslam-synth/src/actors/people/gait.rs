@@ -45,11 +45,11 @@ pub fn walk(p: &Proportions, distance: f32, speed: f32, seed: u64, time: f32) ->
         let (hip, knee) = bend(p, foot.forward, HIPS * (p.thigh() + p.shank()) - foot.up);
         (j.hip[side], j.knee[side], j.ankle[side]) = (hip, knee, foot.pitch - hip + knee);
         // The arm swings against its leg, which is foremost when its foot is put down.
-        let cos = (at * TAU).cos();
+        let cos = libm::cosf(at * TAU);
         j.shoulder[side] = -0.38 * cos + 0.02;
         j.elbow[side] = 0.40 - 0.15 * cos;
     }
-    let (sin, cos) = (cycle * TAU).sin_cos();
+    let (sin, cos) = libm::sincosf(cycle * TAU);
     j.pelvis = [0.05 * cos, 0.03 * sin];
     j.trunk = [0.05, -0.08 * cos, 0.0];
     let mut j = stand.blend(&j, effort);
@@ -74,7 +74,7 @@ fn foot(p: &Proportions, at: f32) -> Foot {
     let stride = stride(p);
     // Turning about the ball moves the ankle up and forward.
     let rolled = |heel: f32| {
-        let (sin, cos) = heel.sin_cos();
+        let (sin, cos) = libm::sincosf(heel);
         let a = p.ankle();
         [BALL_M * (1.0 - cos) + a * sin, BALL_M * sin - a * (1.0 - cos)]
     };
@@ -87,17 +87,18 @@ fn foot(p: &Proportions, at: f32) -> Foot {
     let heel = HEEL_RISE * (1.0 - smooth(t / 0.8));
     let [forward, up] = rolled(heel);
     let swing = AHEAD - STANCE + STANCE * smooth(t);
-    let lift = LIFT_M * (std::f32::consts::PI * t).sin().powi(2);
+    let lift = LIFT_M * libm::sinf(std::f32::consts::PI * t).powi(2);
     Foot { forward: stride * swing + forward, up: up + lift, pitch: -heel }
 }
 
 /// Returns the angles of hip and knee that bring the ankle `forward` of the hip and `down` from it.
 fn bend(p: &Proportions, forward: f32, down: f32) -> (f32, f32) {
     let (thigh, shank) = (p.thigh(), p.shank());
-    let reach = forward.hypot(down).clamp(0.3 * (thigh + shank), 0.999 * (thigh + shank));
-    let inside = ((thigh * thigh + shank * shank - reach * reach) / (2.0 * thigh * shank)).clamp(-1.0, 1.0).acos();
-    let above = ((thigh * thigh + reach * reach - shank * shank) / (2.0 * thigh * reach)).clamp(-1.0, 1.0).acos();
-    (forward.atan2(down) + above, std::f32::consts::PI - inside)
+    let reach = libm::hypotf(forward, down).clamp(0.3 * (thigh + shank), 0.999 * (thigh + shank));
+    let inside =
+        libm::acosf(((thigh * thigh + shank * shank - reach * reach) / (2.0 * thigh * shank)).clamp(-1.0, 1.0));
+    let above = libm::acosf(((thigh * thigh + reach * reach - shank * shank) / (2.0 * thigh * reach)).clamp(-1.0, 1.0));
+    (libm::atan2f(forward, down) + above, std::f32::consts::PI - inside)
 }
 
 /// Returns a slow, smooth, seeded sway of about [-1, 1]; `channel` distinguishes the joints.
@@ -105,7 +106,7 @@ fn sway(seed: u64, channel: u64, time: f32, hertz: f32) -> f32 {
     let mut rng = Rng::new(seed, channel);
     let (a, b) = (rng.range(0.0, TAU), rng.range(0.0, TAU));
     let (f, g) = (hertz * rng.range(0.8, 1.2), hertz * rng.range(1.7, 2.4));
-    0.7 * (TAU * f * time + a).sin() + 0.3 * (TAU * g * time + b).sin()
+    0.7 * libm::sinf(TAU * f * time + a) + 0.3 * libm::sinf(TAU * g * time + b)
 }
 
 /// Adds breathing, glances and gestures that come and go; with `lively` 1 they are those of a conversation.
@@ -151,7 +152,7 @@ pub fn stoop(j: &mut Joints, depth: f32) {
 
 /// Returns the joints of a person who sits with the hip joints `height` metres above the floor, shanks upright, soles on the floor.
 pub fn sit(p: &Proportions, height: f32, seed: u64, time: f32) -> Joints {
-    let bend = ((height - p.shank() - p.ankle()) / p.thigh()).clamp(-0.3, 0.9).acos();
+    let bend = libm::acosf(((height - p.shank() - p.ankle()) / p.thigh()).clamp(-0.3, 0.9));
     let mut j = Joints {
         hip: [bend; 2],
         knee: [bend; 2],

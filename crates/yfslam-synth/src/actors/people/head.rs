@@ -19,8 +19,8 @@ pub enum Cut {
 
 /// Returns the surface of skull and face around their middle: u once around from the right ear over the face, v from crown to chin.
 fn skull(u: f32, v: f32) -> Vec3 {
-    let (sin, cos) = (u * std::f32::consts::TAU).sin_cos();
-    let (ring, height) = (v * std::f32::consts::PI).sin_cos();
+    let (sin, cos) = libm::sincosf(u * std::f32::consts::TAU);
+    let (ring, height) = libm::sincosf(v * std::f32::consts::PI);
     // No taper above the eyes; the jaw is narrower, and less deep at the back.
     let below = (-height).max(0.0);
     let wide = 0.077 * (1.0 - 0.30 * below * below);

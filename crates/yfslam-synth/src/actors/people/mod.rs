@@ -97,7 +97,7 @@ impl Person {
         let standing = gait::stand(self.seed, time);
         let mut joints = sitting.blend(&standing, risen);
         // To get up, a person leans over the feet.
-        joints.trunk[0] += 0.75 * (std::f32::consts::PI * risen).sin();
+        joints.trunk[0] += 0.75 * libm::sinf(std::f32::consts::PI * risen);
         let ankle = |j: &Joints| {
             let poses = skeleton::forward_kinematics(&Isometry3::identity(), p, j);
             let [right, left] = [0, 1].map(|side| poses[Bone::Foot(side).index()].translation.vector);
