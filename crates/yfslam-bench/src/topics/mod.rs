@@ -3,6 +3,7 @@
 pub mod ablation;
 pub mod cost;
 pub mod dense;
+pub mod instructions;
 pub mod loops;
 pub mod monocular;
 pub mod recordings;
@@ -79,13 +80,14 @@ pub struct Topic {
 }
 
 /// All topics, in the order of the pages.
-pub const TOPICS: [&Topic; 9] = [
+pub const TOPICS: [&Topic; 10] = [
     &recordings::TOPIC,
     &synthetic::TOPIC,
     &monocular::TOPIC,
     &stereo::TOPIC,
     &shutter::TOPIC,
     &cost::TOPIC,
+    &instructions::TOPIC,
     &dense::TOPIC,
     &loops::TOPIC,
     &ablation::TOPIC,
