@@ -5,6 +5,7 @@
 //! ```
 //!
 //! An arrow points from a folder to the folders that it may use; `tests/structure.rs` checks it.
+#![forbid(unsafe_code)]
 
 mod command;
 mod draw;

@@ -69,7 +69,7 @@ fn the_products_of_a_run_agree_with_each_other_and_are_the_same_on_every_run() {
             assert_eq!(fs::read(entry.path()).unwrap(), fs::read(&other).unwrap(), "{other:?}");
             compared += 1;
         }
-        assert_eq!(compared, 9);
+        assert_eq!(compared, 11);
     }
     assert_eq!(fs::read(first.join("dense.map")).unwrap(), fs::read(again.join("dense.map")).unwrap());
     let mut saved = fs::read(folder.path().join("first.map")).unwrap();

@@ -40,6 +40,16 @@ fn methods_run_together_give_the_results_of_separate_runs_also_with_faults() {
         assert!(images.count() > 20, "{method}");
     }
     assert!(!folder.path().join("all/report.html").exists() && !folder.path().join("all/trajectory.txt").exists());
+    // The next run in the same folder has one method: nothing of the earlier one stays, but for what is not of a run.
+    fs::write(folder.path().join("all/none/notes.txt"), "mine").unwrap();
+    succeeds(folder.path(), &["run", WALKING, "--end", "3", "--out", "all", "-q"]);
+    for method in METHODS {
+        let left: Vec<_> =
+            fs::read_dir(folder.path().join("all").join(method)).unwrap().flatten().map(|e| e.file_name()).collect();
+        let expected: &[&str] = if method == "none" { &["config.toml", "notes.txt"] } else { &["config.toml"] };
+        assert_eq!(left.len(), expected.len(), "{method}: {left:?}");
+        assert!(expected.iter().all(|name| left.iter().any(|l| l == name)), "{method}: {left:?}");
+    }
 }
 
 #[test]

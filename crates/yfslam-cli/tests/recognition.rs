@@ -85,6 +85,8 @@ fn a_saved_map_is_relocalised_in_and_stays_unchanged_or_is_extended() {
     let (mapped, localised) = (report(&folder.path().join("a")), report(&folder.path().join("b")));
     assert_eq!(localised["map"]["landmarks"], mapped["map"]["landmarks"], "none is forgotten");
     assert_eq!(localised["frames"]["tracked"], 90);
+    let recognised = &localised["loops_and_relocalisation"]["loaded_map"]["recognised"];
+    assert_eq!(recognised["after_frames"], 0, "{recognised}");
     assert_eq!(localised["map"]["keyframes"], 0, "no keyframe is of this run");
     let (mapped, localised) = (ate_rmse(&mapped), ate_rmse(&localised));
     assert!(localised < 1.2 * mapped.max(0.003), "{localised} m in the map, {mapped} m when it was made");
@@ -93,6 +95,15 @@ fn a_saved_map_is_relocalised_in_and_stays_unchanged_or_is_extended() {
     let keyframes =
         |name: &str| SavedMap::from_bytes(&fs::read(folder.path().join(name)).unwrap()).unwrap().map().keyframe_count();
     assert!(keyframes("more.map") >= keyframes("desk.map"));
+    let frame = |name: &str| fs::read_to_string(folder.path().join(name).join("T_map_world.txt")).unwrap();
+    assert!(frame("a").contains("up: camera"), "{}", frame("a"));
+    assert_eq!([frame("b"), frame("c")], [frame("a"), frame("a")], "the map frame is kept over sessions");
+    let elsewhere = "synth:walking_xyz?scene=rescue&people=0&frames=60&width=320&height=240";
+    let lost = ["run", elsewhere, "--load-map", "desk.map", "--out", "d", "-q"];
+    fails(folder.path(), &[&lost[..], &["--localise"]].concat(), &["desk.map was not recognised in any of 60 frames"]);
+    fails(folder.path(), &[&lost[..], &["--end", "9"]].concat(), &["any of 9 frames", "a new map is begun only after"]);
+    let printed = succeeds(folder.path(), &lost).stdout;
+    assert!(printed.contains("desk.map was not recognised\n"), "{printed}");
 }
 
 #[test]

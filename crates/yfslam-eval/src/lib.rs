@@ -9,6 +9,7 @@
 //! In: two trajectories as slices of [`StampedPose`]. Out: results that serialise with serde. The metrics are those of Sturm et al.,
 //! "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and agree with the tool `evo`; paper §4.2 reports them.
 //! [`evaluate`] does it all in one call; each step is public on its own.
+#![forbid(unsafe_code)]
 
 mod align;
 mod associate;

@@ -29,6 +29,7 @@
 //!     Ok(())
 //! }
 //! ```
+#![forbid(unsafe_code)]
 
 mod atomic_file;
 pub mod bag;
@@ -61,7 +62,7 @@ pub use error::{Error, Result};
 pub use faults::{Delivery, Fault, FaultInjector, FaultKind};
 pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};
-pub use text::read_file;
+pub use text::{read_file, read_text};
 pub use trajectory::{StampedPose, TrajectoryFile, write_trajectory};
 pub use write::RecordingWriter;
 

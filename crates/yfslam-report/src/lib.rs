@@ -18,6 +18,7 @@
 //!
 //! The same data give the same bytes. Measured times stand in elements with the attribute `data-timing` only: without them, the page of
 //! a run and the page of its repetition are equal.
+#![forbid(unsafe_code)]
 
 mod content;
 mod evaluation;

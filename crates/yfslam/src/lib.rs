@@ -79,6 +79,7 @@
 //! `t_a_b` maps points of frame b into frame a. The camera frame has x to the right, y down and z forward; the world is the camera frame
 //! of the first keyframe. Lengths are metres (of a single camera: in a unit of its own), times integer nanoseconds. [`nalgebra`] is
 //! re-exported.
+#![forbid(unsafe_code)]
 #![deny(unreachable_pub)]
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![warn(missing_docs)]
@@ -105,8 +106,9 @@ mod worker;
 
 pub use nalgebra;
 
-pub use camera::Camera;
+pub use camera::{Camera, CameraError};
 pub use config::{Config, DepthSource, Method};
+pub use dense::MapFrame;
 pub use detect::{BoundingBox, Detection, Detector, DetectorError, RollCompensation, mask_of_classes};
 pub use dynamic::{DynamicFilter, FilterInput, FirstPose, MovingMask, Region};
 pub use features::{Feature, FrameFeatures};
@@ -120,5 +122,5 @@ pub use map::{KeyFrame, KeyFrameId, KeyframeRelativePose, Landmark, LandmarkId, 
 pub use system::{
     FrameRejected, MapUse, Readout, SavedMap, SetupError, Slam, SlamBuilder, StageTimes, Statistics, Tracked,
 };
-pub use tracking::{LostReason, TrackingState};
+pub use tracking::{LostReason, TrackingStart, TrackingState};
 pub use worker::Execution;

@@ -14,6 +14,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use yfslam::{Config, Detection, Detector, DetectorError, Image, RgbImage};
 use yfslam_detect::{DetectorConfig, EMBEDDED_MODEL, Network, YoloFastestV2};
+use yfslam_io::read_file;
 
 use crate::stats::cpu;
 
@@ -129,7 +130,7 @@ pub fn load(args: &DetectorArgs, config: DetectorConfig) -> Result<LoadedDetecto
             (Box::new(YoloFastestV2::embedded(&config)?), EMBEDDED.into(), EMBEDDED_MODEL.into())
         }
         Some(Model::File(file)) => {
-            let bytes = std::fs::read(file)
+            let bytes = read_file(file)
                 .with_context(|| format!("cannot read the detector {}; check the path", file.display()))?;
             let network = yfslam_detect::load(&file.display().to_string(), &bytes, &config)?;
             (network, file.clone(), Cow::from(bytes))

@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum, value_parser};
 use yfslam::config::Grouping;
 use yfslam::{Config, Method};
+use yfslam_io::read_text;
 
 /// Settings of the system.
 #[derive(Args, Clone, Debug, Default)]
@@ -20,6 +21,10 @@ pub struct SettingsArgs {
     /// Run the detector on every N-th frame [default: 1]; tracks of people are predicted in between.
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1000))]
     pub detect_every: Option<u32>,
+    /// Run the detector only when it is needed, but at least at this interval, s, such as 0.15: when a track is uncertain, something moves that
+    /// no track covers, or the view has changed [default: 0, on every frame].
+    #[arg(long, value_name = "S")]
+    pub detect_gap: Option<f64>,
     /// Do not wait for the detector: use boxes when they are ready, for live use with --threaded.
     #[arg(long)]
     pub detect_async: bool,
@@ -92,7 +97,7 @@ impl SettingsArgs {
     pub fn resolve(&self) -> Result<Config> {
         let mut config = match &self.config {
             Some(path) => {
-                let text = std::fs::read_to_string(path)
+                let text = read_text(path)
                     .with_context(|| format!("cannot read the configuration {}; check the path", path.display()))?;
                 Config::from_toml(&text)
                     .with_context(|| format!("{}: see `yfslam config` for all keys", path.display()))?
@@ -109,6 +114,7 @@ impl SettingsArgs {
         config.monocular.seed = self.seed.unwrap_or(config.monocular.seed);
         let dynamic = &mut config.dynamic;
         dynamic.detect_every = self.detect_every.map_or(dynamic.detect_every, |every| every as usize);
+        dynamic.detect_max_gap_s = self.detect_gap.unwrap_or(dynamic.detect_max_gap_s);
         dynamic.detect_async |= self.detect_async;
         Ok(config)
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use yfslam::RgbImage;
-use yfslam::dense::{DenseConfig, DenseMap, Up, cloud};
+use yfslam::dense::{DenseConfig, DenseMap, cloud};
 use yfslam_io::write_atomically;
 use yfslam_report::DenseMapImages;
 
@@ -30,7 +30,7 @@ pub fn write(folder: &Path, encoded: &[u8]) -> Result<()> {
 /// # Errors
 /// The map would take more memory than is allowed, or an image is too large for PNG.
 pub fn images(config: &DenseConfig, map: &DenseMap) -> Result<DenseMapImages> {
-    let turn = map.turn(Up::Level);
+    let turn = map.frame().r_map_world;
     let volume = map.volume(config, &turn, |_| {})?;
     let points = cloud(map, &volume, |_| {});
     let cut_m = map.floor_m(&turn).unwrap_or_default() as f32 + SHOWN_M;

@@ -4,13 +4,15 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use yfslam::Config;
-use yfslam_io::write::write_ply;
+use yfslam::{Config, Method};
+use yfslam_io::write::{Coordinates, write_ply};
 use yfslam_io::{StampedPose, prepare_folder, write_atomically, write_trajectory};
 
 use super::dense::DENSE_FILE;
+use super::map_frame::{self, MAP_FRAME_FILE};
 use super::overlay;
 use super::report::RunReport;
+use crate::input::settings::describe;
 use crate::run::pipeline::Outcome;
 use crate::ui::failures::Failures;
 
@@ -29,8 +31,37 @@ const RUN_FILE: &str = "run.json";
 const CONFIG_FILE: &str = "config.toml";
 
 /// The results of a run; `config.toml` is no result, and may be the input that repeats the run.
-const RESULT_FILES: [&str; 8] =
-    [TRAJECTORY_FILE, KEYFRAMES_FILE, LIVE_FILE, LANDMARKS_FILE, RUN_FILE, REPORT_FILE, DENSE_FILE, FAILURE_FILE];
+const RESULT_FILES: [&str; 9] = [
+    TRAJECTORY_FILE,
+    KEYFRAMES_FILE,
+    LIVE_FILE,
+    LANDMARKS_FILE,
+    MAP_FRAME_FILE,
+    RUN_FILE,
+    REPORT_FILE,
+    DENSE_FILE,
+    FAILURE_FILE,
+];
+
+/// The folder in which `yfslam map` writes, and its files but for those of backgrounds, which are named after keyframes.
+pub const PRODUCTS_FOLDER: &str = "map";
+const PRODUCT_FILES: [&str; 15] = [
+    MAP_FRAME_FILE,
+    "path.txt",
+    "cloud.ply",
+    "cloud.pcd",
+    "above.png",
+    "corner.png",
+    "classes.png",
+    "classes.json",
+    "octomap.bt",
+    "octomap.ot",
+    "semantic.ot",
+    "grid.pgm",
+    "grid.yaml",
+    "grid.png",
+    "mesh.ply",
+];
 
 /// A folder that can be written to.
 #[derive(Clone, Debug)]
@@ -68,13 +99,23 @@ impl OutputFolder {
         is_here && names.map(OsStr::new).any(|name| path.file_name() == Some(name))
     }
 
-    /// Removes the results of an earlier run, which must not be taken for those of this one.
+    /// Removes the results of an earlier run of one or several methods and what `yfslam map` has made of it, which must not be taken for
+    /// results of this one.
     ///
     /// # Errors
     /// A file cannot be removed.
     pub fn remove_results(&self) -> Result<()> {
-        remove_files(&self.0, |name| RESULT_FILES.contains(&name))?;
-        overlay::remove(&self.0)
+        let is_run = |folder: &PathBuf| folder.join(RUN_FILE).is_file() || folder.join(FAILURE_FILE).is_file();
+        let methods = Method::ALL.map(|method| self.0.join(describe(method).0));
+        for folder in methods.iter().filter(|folder| is_run(folder)).chain([&self.0]) {
+            remove_files(folder, |name| RESULT_FILES.contains(&name))?;
+            overlay::remove(folder)?;
+            let products = folder.join(PRODUCTS_FOLDER);
+            if products.join(MAP_FRAME_FILE).is_file() {
+                remove_files(&products, |name| PRODUCT_FILES.contains(&name))?;
+            }
+        }
+        Ok(())
     }
 
     /// Writes why the method has no result.
@@ -109,7 +150,8 @@ impl OutputFolder {
         for (name, poses) in [(TRAJECTORY_FILE, trajectory), (KEYFRAMES_FILE, keyframes), (LIVE_FILE, live)] {
             failures.keep(write_trajectory(&self.0.join(name), poses));
         }
-        failures.keep(write_ply(&self.0.join(LANDMARKS_FILE), landmarks.iter().copied(), None));
+        failures.keep(write_ply(&self.0.join(LANDMARKS_FILE), Coordinates::World, landmarks.iter().copied(), None));
+        failures.keep(map_frame::write(&self.0, &outcome.map_frame));
     }
 
     /// Writes `run.json`.

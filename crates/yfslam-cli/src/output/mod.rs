@@ -5,6 +5,7 @@ pub mod dense;
 pub mod detections_file;
 pub mod folder;
 pub mod html;
+pub mod map_frame;
 mod overlay;
 pub mod plots;
 pub mod processor_time;

@@ -6,6 +6,7 @@ use yfslam_eval::Evaluation;
 use yfslam_io::Fault;
 use yfslam_io::sequence::AssociationReport;
 
+use super::map_frame::Frames;
 use super::recorder::ReportImages;
 use crate::input::boxes::BoxOrigin;
 use crate::input::source::{MaskTally, Source, Truth};
@@ -51,6 +52,8 @@ pub struct RunReport<'a> {
     /// Faults put into the frames on purpose.
     pub faults: Vec<String>,
     pub frames: &'a FrameTally,
+    /// The frames in which the files of the run have their coordinates.
+    pub coordinates: Frames,
     /// Whether a signal ended the run before its last frame.
     pub interrupted: bool,
     /// The association of colour images with depth or right images; `null` for synthetic worlds.
@@ -116,6 +119,7 @@ impl<'a> RunReport<'a> {
             masks: source.masks.as_ref(),
             faults: faults.iter().map(ToString::to_string).collect(),
             frames: &outcome.frames,
+            coordinates: Frames::from(&outcome.map_frame),
             interrupted: interrupted.is_some(),
             association: source.association.as_ref().map(Association::from),
             dynamic: &outcome.dynamic,

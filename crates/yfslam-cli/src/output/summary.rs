@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use anyhow::Result;
 use yfslam_eval::{AlignmentKind, improvement_percent};
+use yfslam_io::time::format_stamp;
 use yfslam_report::{Table, TableStyle};
 
 use super::processor_time::{describe_processor_time, processor_time};
@@ -12,7 +13,7 @@ use crate::input::boxes::BoxOrigin;
 use crate::input::settings::describe;
 use crate::input::source::Truth;
 use crate::run::method_run::RunResult;
-use crate::stats::recognition::{Loop, RecognitionTally};
+use crate::stats::recognition::{LoadedMap, Loop, LostPeriod, Recognition, RecognitionTally};
 
 /// Summarises the run of one method in a few lines.
 pub fn of_one(report: &RunReport, run: &ReportedRun) -> Result<String> {
@@ -73,6 +74,20 @@ pub fn of_one(report: &RunReport, run: &ReportedRun) -> Result<String> {
 }
 
 fn write_recognition(text: &mut String, recognition: &RecognitionTally) -> Result<()> {
+    match &recognition.loaded_map {
+        Some(LoadedMap { file, recognised: None }) => writeln!(text, "{file} was not recognised")?,
+        Some(LoadedMap {
+            file,
+            recognised: Some(Recognition { timestamp_ns, after_frames, position_m: [x, y, z] }),
+        }) => {
+            let time = format_stamp(*timestamp_ns);
+            writeln!(
+                text,
+                "{file} was recognised after {after_frames} frames, at {time} s, position {x:.2} {y:.2} {z:.2} m in its world"
+            )?;
+        }
+        None => {}
+    }
     let merges = recognition.loops.iter().filter(|l| l.merged_submaps).count();
     // The scale of a single camera drifts.
     let drift = |l: &Loop| {
@@ -88,12 +103,13 @@ fn write_recognition(text: &mut String, recognition: &RecognitionTally) -> Resul
         writeln!(text, "submaps merged: {merges}")?;
     }
     if let Some(longest) = recognition.lost.iter().map(|period| period.frames).max() {
-        let relocalised = recognition.lost.iter().filter(|period| period.relocalised).count();
-        writeln!(
-            text,
-            "lost {} times, relocalised {relocalised} times; lost for {longest} frames at most",
-            recognition.lost.len()
-        )?;
+        let count = |ended: fn(&LostPeriod) -> bool| recognition.lost.iter().filter(|period| ended(period)).count();
+        let (relocalised, begun_anew) = (count(|period| period.relocalised), count(|period| period.begun_anew));
+        write!(text, "lost {} times, relocalised {relocalised} times", recognition.lost.len())?;
+        if begun_anew > 0 {
+            write!(text, ", begun anew {begun_anew} times")?;
+        }
+        writeln!(text, "; lost for {longest} frames at most")?;
     }
     Ok(())
 }

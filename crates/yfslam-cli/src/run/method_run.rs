@@ -83,7 +83,10 @@ impl MethodRun {
             builder = builder.dense(config.dense.clone());
         }
         let slam = map.build(builder, makes_dense_map)?;
-        let pipeline = Pipeline::new(slam, map.execution() == Execution::Inline, times);
+        let mut pipeline = Pipeline::new(slam, map.execution() == Execution::Inline, times);
+        if let Some(file) = &map.load_map {
+            pipeline = pipeline.with_loaded_map(file);
+        }
         Ok(Self { config, pipeline, makes_dense_map, state: TrackingState::default() })
     }
 

@@ -2,12 +2,13 @@
 //!
 //! In: a SLAM system, frames. Out: an [`Outcome`]. Ground truth is not used here.
 
+use std::path::Path;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use yfslam::config::DepthSource;
-use yfslam::{Config, Frame, Pose, Slam, Tracked, TrackingState};
+use yfslam::{Config, Frame, MapFrame, MapUse, Pose, Slam, Tracked, TrackingState};
 use yfslam_io::StampedPose;
 use yfslam_io::time::format_stamp;
 use yfslam_io::write::PlyPoint;
@@ -17,7 +18,7 @@ use crate::input::detector::DetectorTime;
 use crate::stats::cpu;
 use crate::stats::process::{Part, Parts};
 use crate::stats::readout::ReadoutReport;
-use crate::stats::recognition::RecognitionTally;
+use crate::stats::recognition::{LoadedMap, RecognitionTally};
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
 use crate::stats::tally::{DynamicTally, FrameTally};
@@ -51,6 +52,8 @@ pub struct Outcome {
     pub live: Vec<StampedPose>,
     /// Keyframes of this run in the final map.
     pub keyframes: Vec<StampedPose>,
+    /// The frame of maps made of this run.
+    pub map_frame: MapFrame,
     /// Landmarks of the final map.
     pub landmarks: Vec<PlyPoint>,
     pub frames: FrameTally,
@@ -86,6 +89,13 @@ impl Pipeline {
         }
     }
 
+    /// Notes that the system has begun with the map in `file`.
+    #[must_use]
+    pub fn with_loaded_map(mut self, file: &Path) -> Self {
+        self.recognition.loaded_map = Some(LoadedMap { file: file.display().to_string(), recognised: None });
+        self
+    }
+
     /// Tracks one frame and returns the state after it; a frame that SLAM refuses is counted as skipped.
     pub fn track(&mut self, frame: &Frame) -> TrackingState {
         let started = Instant::now();
@@ -104,7 +114,7 @@ impl Pipeline {
         self.add_stages(&tracked);
         self.frames.count(tracked.state);
         self.dynamic.count(&self.slam);
-        self.recognition.count(&tracked);
+        self.recognition.count(&tracked, self.frames.total() - 1);
         if self.slam.statistics().resets > self.resets {
             // A new map has another world frame: earlier poses do not belong to this trajectory.
             self.resets = self.slam.statistics().resets;
@@ -243,6 +253,7 @@ impl Pipeline {
         if self.frames.tracked == 0 {
             self.fail(config)?;
         }
+        let map_frame = self.slam.map_frame();
         let map = self.slam.map();
         let first_keyframe = self.slam.statistics().first_keyframe;
         let new_keyframes = map.keyframes().filter(|(_, k)| k.sequence >= first_keyframe);
@@ -253,6 +264,7 @@ impl Pipeline {
             trajectory: self.trajectory(),
             live: self.live,
             keyframes: keyframes.into_iter().map(|(_, t, t_cam_world)| stamped((t, t_cam_world.inverse()))).collect(),
+            map_frame,
             landmarks: map.landmarks().map(|(_, l)| landmark(l)).collect(),
             frames: self.frames,
             dynamic: self.dynamic,
@@ -270,6 +282,21 @@ impl Pipeline {
         if *read == 0 {
             let Some(first) = first_skipped else { bail!("no trajectory: no frame was read") };
             bail!("no trajectory: none of the {skipped} frames can be used; the first: {first}");
+        }
+        if let Some(LoadedMap { file, .. }) = &self.recognition.loaded_map {
+            let begins = match self.slam.map_use() {
+                Some(MapUse::Extend) => {
+                    format!(
+                        ", and a new map is begun only after {} s (tracking.reset_after_s)",
+                        config.tracking.reset_after_s
+                    )
+                }
+                _ => String::new(),
+            };
+            bail!(
+                "no trajectory: {file} was not recognised in any of {read} frames ({skipped} skipped){begins}; the recording has to show places of \
+                 the map from similar directions and in similar light"
+            );
         }
         let (features, with_depth) = self.best_start;
         if config.depth.source == DepthSource::Motion {

@@ -44,6 +44,18 @@ pub struct RawOutput {
     pub values: Vec<f32>,
 }
 
+/// Largest file of a network, bytes.
+const MAX_FILE: u64 = 1 << 30;
+
+/// Reads a regular file: a device or a pipe might never end.
+fn read(path: &Path) -> std::io::Result<Vec<u8>> {
+    let metadata = std::fs::metadata(path)?;
+    if !metadata.is_file() || metadata.len() > MAX_FILE {
+        return Err(std::io::Error::other(format!("not a regular file of at most {} MiB", MAX_FILE >> 20)));
+    }
+    std::fs::read(path)
+}
+
 impl YoloFastestV2 {
     /// Loads an ONNX file.
     ///
@@ -51,7 +63,7 @@ impl YoloFastestV2 {
     /// The file cannot be read, is not an ONNX model, has another architecture, or does not fit `config`.
     pub fn load(path: &Path, config: &DetectorConfig) -> Result<Self, ModelError> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|source| ModelError::Io { path: name.clone(), source })?;
+        let bytes = read(path).map_err(|source| ModelError::Io { path: name.clone(), source })?;
         Self::from_bytes(&name, &bytes, config)
     }
 

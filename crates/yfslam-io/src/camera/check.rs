@@ -1,128 +1,19 @@
 //! Refuses calibrations that no camera can have, before a trajectory is computed from them.
 
-use yfslam::Camera;
-
 use super::CameraSource;
 use crate::error::{Error, Result};
-
-/// Largest side of an image, px.
-const MAX_SIDE: usize = 16_384;
-
-/// Focal lengths relative to the longer side of the image: from a field of view of 157° to one of 1°. Beyond are mistakes in the value.
-const FOCAL_PER_SIDE: std::ops::RangeInclusive<f64> = 0.1..=60.0;
-
-/// Largest ratio of fx and fy, in either direction: that of images whose rows or columns were left out.
-const MAX_ASPECT: f64 = 4.0;
-
-/// Distance of a rectified pair of cameras, m.
-const BASELINE_M: std::ops::RangeInclusive<f64> = 1e-4..=1e3;
-
-/// Frames per second: from one in three hours.
-const FPS: std::ops::RangeInclusive<f64> = 1e-4..=1e5;
-
-/// Longest time that a sensor takes to read its rows, ms: more than any camera for video needs.
-const MAX_READOUT_MS: f64 = 100.0;
-
-/// Largest error after undistorting and distorting a point, px. Above it the distortion cannot be inverted.
-const MAX_ROUND_TRIP_PX: f64 = 0.5;
 
 /// Checks a calibration with its depth factor; error messages name its origin.
 ///
 /// # Errors
-/// A value is out of range: sizes, focal lengths, depth factor, rate and `bf` must be positive and finite, and the distortion must be
-/// invertible up to the border of the image.
+/// The depth factor is not positive and finite, or no camera can have the calibration ([`yfslam::Camera::check`]).
 pub fn check_camera(source: &CameraSource) -> Result<()> {
     let CameraSource { camera, depth_factor, origin, .. } = source;
-    let refuse = |problem: String, cure: &str| Err(Error::argument(format!("camera {origin}: {problem}"), cure));
-    let has_size = !source.missing.size;
-    for (name, side) in [("width", camera.width), ("height", camera.height)].into_iter().filter(|_| has_size) {
-        if !(1..=MAX_SIDE).contains(&side) {
-            return refuse(format!("{name} is {side}"), "give the size of the images in pixels");
-        }
+    let refuse = |problem: &str, cure: &str| Err(Error::argument(format!("camera {origin}: {problem}"), cure));
+    if !(depth_factor.is_finite() && *depth_factor > 0.0) {
+        let cure = "give the depth units per metre: 5000 for TUM, 1000 for millimetres";
+        return refuse(&format!("depth factor is {depth_factor}"), cure);
     }
-    let positive = [
-        ("fx", camera.fx, "give the focal length in pixels"),
-        ("fy", camera.fy, "give the focal length in pixels"),
-        ("depth factor", *depth_factor, "give the depth units per metre: 5000 for TUM, 1000 for millimetres"),
-        ("fps", camera.fps, "give the frames per second, such as 30"),
-        ("bf", camera.bf, "give the baseline of the depth sensor times fx, such as 40"),
-    ];
-    for (name, value, cure) in positive {
-        if !(value.is_finite() && value > 0.0) {
-            return refuse(format!("{name} is {value}"), cure);
-        }
-    }
-    if let Some((problem, cure)) = implausible(camera, has_size) {
-        return refuse(problem, cure);
-    }
-    let Camera { readout_ms, depth_readout_ms, depth_delay_ms, .. } = *camera;
-    let times =
-        [("readout_ms", readout_ms), ("depth_readout_ms", depth_readout_ms), ("depth_delay_ms", depth_delay_ms)];
-    for (name, value) in times {
-        if let Some(value) = value.filter(|value| value.is_nan() || value.abs() > MAX_READOUT_MS) {
-            let cure = "give milliseconds between -100 and 100, 0 for a global shutter, or leave the key out: it is then estimated";
-            return refuse(format!("{name} is {value}"), cure);
-        }
-    }
-    let others = [camera.cx, camera.cy].into_iter().chain(camera.distortion).chain(camera.rational);
-    if let Some(value) = others.into_iter().find(|value| !value.is_finite()) {
-        return refuse(format!("the principal point or the distortion contains {value}"), "calibrate the camera again");
-    }
-    if !has_size {
-        return Ok(());
-    }
-    check_distortion(camera).or_else(|(u, v)| {
-        let rational = if camera.rational == [0.0; 3] { String::new() } else { format!(" with {:?}", camera.rational) };
-        let problem = format!("distortion {:?}{rational} folds the image at pixel ({u:.0}, {v:.0})", camera.distortion);
-        refuse(problem, "check the order k1, k2, p1, p2, k3, k4, k5, k6, or set them to 0 for rectified images")
-    })
-}
-
-/// Returns what no camera of this size has, and what to do.
-fn implausible(camera: &Camera, has_size: bool) -> Option<(String, &'static str)> {
-    let Camera { fx, fy, cx, cy, fps, bf, .. } = *camera;
-    let (width, height) = (camera.width as f64, camera.height as f64);
-    if !(1.0 / MAX_ASPECT..=MAX_ASPECT).contains(&(fx / fy)) {
-        return Some((format!("fx is {fx} and fy is {fy}"), "give both focal lengths in pixels; they hardly differ"));
-    }
-    if !BASELINE_M.contains(&(bf / fx)) {
-        let problem = format!("bf is {bf}: with fx {fx} the baseline is {:e} m", bf / fx);
-        return Some((problem, "give the baseline in m times fx in px, such as 40"));
-    }
-    if !FPS.contains(&fps) {
-        return Some((format!("fps is {fps}"), "give the frames per second, such as 30"));
-    }
-    if !has_size {
-        return None;
-    }
-    let longer = width.max(height);
-    for (name, focal) in [("fx", fx), ("fy", fy)] {
-        if !FOCAL_PER_SIDE.contains(&(focal / longer)) {
-            let problem = format!("{name} is {focal} px for images of {width}×{height} px");
-            return Some((problem, "give the focal length in pixels of these images"));
-        }
-    }
-    for (name, centre, side) in [("cx", cx, width), ("cy", cy, height)] {
-        if centre.is_finite() && !(-side..=2.0 * side).contains(&centre) {
-            let problem = format!("{name} is {centre} px for images of {width}×{height} px");
-            return Some((problem, "give the principal point in pixels; it is near the middle of the image"));
-        }
-    }
-    None
-}
-
-/// Undistorts and distorts the corners and edge centres; returns the first pixel at which this fails.
-fn check_distortion(camera: &Camera) -> std::result::Result<(), (f64, f64)> {
-    let (right, bottom) = ((camera.width - 1) as f64, (camera.height - 1) as f64);
-    for u in [0.0, right / 2.0, right] {
-        for v in [0.0, bottom / 2.0, bottom] {
-            let [x, y] = camera.undistort(u, v);
-            let [u_again, v_again] = camera.distort(x, y);
-            let error_px = (u_again - u).hypot(v_again - v);
-            if error_px.is_nan() || error_px > MAX_ROUND_TRIP_PX {
-                return Err((u, v));
-            }
-        }
-    }
-    Ok(())
+    let checked = if source.missing.size { camera.check_without_size() } else { camera.check() };
+    checked.or_else(|error| refuse(&error.problem, error.cure))
 }

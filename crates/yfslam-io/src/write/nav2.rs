@@ -6,6 +6,7 @@ use std::path::Path;
 
 use yfslam::dense::{GridCell, GroundGrid};
 
+use super::Coordinates;
 use crate::atomic_file::write_atomically;
 use crate::error::Result;
 
@@ -28,7 +29,8 @@ pub fn write_nav2(path: &Path, grid: &GroundGrid) -> Result<()> {
         // The grey level 205 is read as (255 - 205) / 255 = 0.19608, which must not be below the threshold of free space.
         write!(
             writer,
-            "image: {name}\nmode: trinary\nresolution: {}\norigin: [{x}, {y}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+            "# {}\nimage: {name}\nmode: trinary\nresolution: {}\norigin: [{x}, {y}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+            Coordinates::Map,
             grid.resolution_m
         )
     })

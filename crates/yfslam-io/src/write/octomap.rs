@@ -9,6 +9,7 @@ use std::path::Path;
 
 use yfslam::dense::{BLOCK_SIDE as SIDE, Block, Voxel};
 
+use super::Coordinates;
 use crate::atomic_file::write_atomically;
 use crate::error::Result;
 
@@ -95,7 +96,7 @@ pub fn write_octomap<I: Iterator<Item = OctreeVoxel>>(
             OctreeFormat::LogOdds => ("# Octomap OcTree file", "OcTree"),
             OctreeFormat::Colors => ("# Octomap OcTree file", "ColorOcTree"),
         };
-        write!(writer, "{title}\n#\nid {id}\nsize {}\nres {resolution_m}\ndata\n", size.nodes)?;
+        write!(writer, "{title}\n# {}\nid {id}\nsize {}\nres {resolution_m}\ndata\n", Coordinates::Map, size.nodes)?;
         root.map_or(Ok(()), |root| below.write(&root, writer))
     })?;
     Ok(size)

@@ -3,11 +3,11 @@
 use std::io;
 use std::path::Path;
 
-use super::{Labels, PlyPoint};
+use super::{Coordinates, Labels, PlyPoint};
 use crate::atomic_file::write_atomically;
 use crate::error::Result;
 
-/// Writes `points` as PCD with fields x, y, z (m) and rgb (packed as PCL packs it), and label (the class) with labels.
+/// Writes `points`, which are in the map frame, as PCD with fields x, y, z (m) and rgb (packed as PCL packs it), and label (the class) with labels.
 ///
 /// # Errors
 /// The file cannot be written, or a position is not finite.
@@ -24,8 +24,9 @@ where
         };
         write!(
             writer,
-            "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nCOUNT {counts}\n\
-             WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n"
+            "# .PCD v0.7 - Point Cloud Data file format\n# {}\nVERSION 0.7\nFIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nCOUNT {counts}\n\
+             WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n",
+            Coordinates::Map
         )?;
         for (number, PlyPoint { position_m, color: [r, g, b] }) in points.enumerate() {
             if !position_m.iter().all(|v| v.is_finite()) {

@@ -3,6 +3,7 @@
 use std::io;
 use std::path::Path;
 
+use super::Coordinates;
 use crate::atomic_file::write_atomically;
 use crate::error::Result;
 
@@ -28,32 +29,33 @@ pub struct Labels<'a> {
 ///
 /// # Errors
 /// The file cannot be written, or a position is not finite.
-pub fn write_ply<I>(path: &Path, points: I, labels: Option<Labels>) -> Result<()>
+pub fn write_ply<I>(path: &Path, frame: Coordinates, points: I, labels: Option<Labels>) -> Result<()>
 where
     I: IntoIterator<Item = PlyPoint, IntoIter: ExactSizeIterator>,
 {
-    write(path, points.into_iter(), labels, &[])
+    write(path, frame, points.into_iter(), labels, &[])
 }
 
 /// Writes a mesh as PLY: coloured vertices, and triangles as indices of three vertices.
 ///
 /// # Errors
 /// The file cannot be written, or a position is not finite.
-pub fn write_ply_mesh<I>(path: &Path, vertices: I, triangles: &[[u32; 3]]) -> Result<()>
+pub fn write_ply_mesh<I>(path: &Path, frame: Coordinates, vertices: I, triangles: &[[u32; 3]]) -> Result<()>
 where
     I: IntoIterator<Item = PlyPoint, IntoIter: ExactSizeIterator>,
 {
-    write(path, vertices.into_iter(), None, triangles)
+    write(path, frame, vertices.into_iter(), None, triangles)
 }
 
 fn write(
     path: &Path,
+    frame: Coordinates,
     points: impl ExactSizeIterator<Item = PlyPoint>,
     labels: Option<Labels>,
     triangles: &[[u32; 3]],
 ) -> Result<()> {
     write_atomically(path, |writer| {
-        writer.write_all(b"ply\nformat binary_little_endian 1.0\n")?;
+        write!(writer, "ply\nformat binary_little_endian 1.0\ncomment {frame}\n")?;
         for (class, name) in labels.iter().flat_map(|labels| (1..).zip(labels.names)) {
             // Without control characters each name takes one line.
             writeln!(writer, "comment class {class} {}", name.replace(char::is_control, " "))?;
@@ -102,11 +104,14 @@ mod tests {
             PlyPoint { position_m: [1.0, -2.5, 0.125], color: [1, 2, 3] },
             PlyPoint { position_m: [0.0, 0.0, 4.0], color: [255, 0, 7] },
         ];
-        write_ply(&path, points, None).unwrap();
+        write_ply(&path, Coordinates::World, points, None).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let end = b"end_header\n";
         let header = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
         assert!(std::str::from_utf8(&bytes[..header]).unwrap().contains("element vertex 2\n"));
+        assert!(
+            String::from_utf8_lossy(&bytes).starts_with("ply\nformat binary_little_endian 1.0\ncomment frame world: ")
+        );
         assert_eq!(bytes.len() - header, 2 * 15);
         assert_eq!(bytes[header + 4..header + 8], (-2.5f32).to_le_bytes());
         assert_eq!(bytes[header + 12..header + 15], [1, 2, 3]);
@@ -119,7 +124,7 @@ mod tests {
         let path = folder.path().join("cloud.ply");
         let points = [1.0, 2.0].map(|x| PlyPoint { position_m: [x, 0.0, 0.0], color: [7, 8, 9] });
         let names = ["chair".to_owned(), "odd\nname".to_owned()];
-        write_ply(&path, points, Some(Labels { classes: &[0, 2], names: &names })).unwrap();
+        write_ply(&path, Coordinates::Map, points, Some(Labels { classes: &[0, 2], names: &names })).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.contains("comment class 1 chair\ncomment class 2 odd name\nelement vertex 2\n"), "{text}");
@@ -132,7 +137,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mesh.ply");
         let corner = |x: f32| PlyPoint { position_m: [x, 0.0, 1.0], color: [9; 3] };
-        write_ply_mesh(&path, [corner(0.0), corner(1.0), corner(2.0)], &[[0, 2, 1]]).unwrap();
+        write_ply_mesh(&path, Coordinates::Map, [corner(0.0), corner(1.0), corner(2.0)], &[[0, 2, 1]]).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.contains("element face 1\nproperty list uchar int vertex_indices\nend_header\n"), "{text}");
@@ -143,9 +148,10 @@ mod tests {
     fn a_point_that_is_not_finite_is_refused_and_nothing_is_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cloud.ply");
-        let error = write_ply(&path, [PlyPoint { position_m: [f32::NAN, 0.0, 0.0], color: [0; 3] }], None)
-            .unwrap_err()
-            .to_string();
+        let error =
+            write_ply(&path, Coordinates::Map, [PlyPoint { position_m: [f32::NAN, 0.0, 0.0], color: [0; 3] }], None)
+                .unwrap_err()
+                .to_string();
         assert!(error.contains("cloud.ply") && error.contains("not finite"), "{error}");
         assert!(!path.exists());
     }

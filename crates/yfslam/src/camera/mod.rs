@@ -2,7 +2,11 @@
 //!
 //! In: the calibration. Out: conversions between normalised coordinates, distorted pixels and undistorted pixels.
 
+mod check;
+
 use serde::{Deserialize, Serialize};
+
+pub use check::CameraError;
 
 /// Frames per second of a camera for which no rate is given.
 const DEFAULT_FPS: f64 = 30.0;

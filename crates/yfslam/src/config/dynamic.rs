@@ -124,6 +124,10 @@ config_section! {
         /// The number of frames from one detection to the next, between which the methods `full` and `yf` continue the tracks.
         /// Source: chosen: every image is searched.
         detect_every: usize = 1, in 1..=10_000, "frames", basic;
+        /// The longest time from one detection to the next, if no track is uncertain, nothing moves that no track covers, and the view has
+        /// not changed; 0 for a detection on every frame that `detect_every` leaves.
+        /// Source: chosen: every image is searched; 0.15 is meant for boards.
+        detect_max_gap_s: f64 = 0.0, in 0.0..=60.0, "s", basic;
         /// Whether frames do not wait for the detector once there is a map, which makes results differ from run to run.
         /// Source: chosen: results repeat exactly without it; it is meant for boards whose detector is slower than the camera.
         detect_async: bool = false, any, basic;

@@ -28,6 +28,10 @@ pub enum Method {
 }
 
 impl Method {
+    /// All methods.
+    pub const ALL: [Self; 7] =
+        [Self::None, Self::Boxes, Self::YfSlam, Self::DsSlam, Self::DynaSlam, Self::DmsSlam, Self::Full];
+
     /// Returns whether the filter uses bounding boxes of movable objects.
     pub fn needs_boxes(self) -> bool {
         !matches!(self, Self::None | Self::DmsSlam)

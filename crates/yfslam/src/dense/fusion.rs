@@ -9,7 +9,7 @@ use nalgebra::UnitQuaternion;
 use crate::config::DenseConfig;
 use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
 use crate::dense::volume::Volume;
-use crate::dense::{DenseError, gravity};
+use crate::dense::{DenseError, MapFrame};
 use crate::geometry::Pose;
 use crate::worker::{Execution, Worker};
 
@@ -52,13 +52,18 @@ struct Fusion {
     volume: Volume,
 }
 impl FusionOwner {
-    /// Returns an owner without patches. The z-axis of the volume points up in the first image, as in ROS (REP 103).
+    /// Returns an owner without patches, whose volume is in the map frame.
     ///
     /// # Errors
     /// If a thread cannot be started.
-    pub(crate) fn new(config: &DenseConfig, grid: &CellGrid, execution: Execution) -> Result<Self, DenseError> {
+    pub(crate) fn new(
+        config: &DenseConfig,
+        grid: &CellGrid,
+        execution: Execution,
+        frame: &MapFrame,
+    ) -> Result<Self, DenseError> {
         let mut fusion =
-            Fusion { grid: grid.clone(), up: gravity::of_camera(), patches: Vec::new(), volume: Volume::new(config) };
+            Fusion { grid: grid.clone(), up: frame.r_map_world, patches: Vec::new(), volume: Volume::new(config) };
         Ok(Self(match execution {
             Execution::Inline => Owner::Inline(Box::new(fusion)),
             Execution::Threaded => {

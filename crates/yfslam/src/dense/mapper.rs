@@ -13,7 +13,7 @@ use crate::dense::fusion::FusionOwner;
 use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
 use crate::dense::object_masks::ObjectMasks;
 use crate::dense::volume::Volume;
-use crate::dense::{DenseError, DenseMap, PlacedPatch, RowShift};
+use crate::dense::{DenseError, DenseMap, MapFrame, PlacedPatch, RowShift};
 use crate::detect::Detection;
 use crate::dynamic::MovingMask;
 use crate::geometry::Pose;
@@ -52,14 +52,19 @@ pub(crate) struct Source<'a> {
 }
 
 impl DenseMapper {
-    /// Returns a dense map for one camera. The z-axis of the volume points up in the first image, as in ROS (REP 103).
+    /// Returns a dense map for one camera, whose volume is in the map frame.
     ///
     /// # Errors
     /// For a value of the configuration out of range, or if a thread cannot be started.
-    pub(crate) fn new(config: &DenseConfig, camera: &Camera, execution: Execution) -> Result<Self, DenseError> {
+    pub(crate) fn new(
+        config: &DenseConfig,
+        camera: &Camera,
+        execution: Execution,
+        frame: &MapFrame,
+    ) -> Result<Self, DenseError> {
         config.validate()?;
         let grid = CellGrid::new(camera, config.stride_px);
-        let fusion = FusionOwner::new(config, &grid, execution)?;
+        let fusion = FusionOwner::new(config, &grid, execution, frame)?;
         Ok(Self {
             config: config.clone(),
             grid,
@@ -78,7 +83,7 @@ impl DenseMapper {
     /// # Errors
     /// If the patches have other cells or belong to another map.
     pub(crate) fn with_earlier(mut self, earlier: DenseMap, map: &Map) -> Result<Self, DenseError> {
-        let DenseMap { grid, mut patches, unmerged, class_names } = earlier;
+        let DenseMap { grid, mut patches, unmerged, class_names, frame: _ } = earlier;
         if grid != self.grid {
             let (found, wanted) = (grid.stride_px(), self.grid.stride_px());
             let (width, height) = (grid.camera().width, grid.camera().height);
@@ -216,7 +221,7 @@ impl DenseMapper {
         let poses = self.rooted_poses(map);
         let largest = largest(&poses);
         let (grid, class_names) = (self.grid.clone(), self.class_names.clone());
-        let mut dense_map = DenseMap { patches: Vec::new(), unmerged: Vec::new(), grid, class_names };
+        let mut dense_map = DenseMap { patches: Vec::new(), unmerged: Vec::new(), grid, class_names, frame: None };
         for (((keyframe, _), pose), (timestamp_ns, patch)) in self.poses.iter().zip(poses).zip(self.fusion.patches()) {
             let surviving = map.surviving_ancestor(*keyframe);
             let Some(((root, t_world_cam), (keyframe, _))) = pose.zip(surviving) else { continue };
@@ -262,7 +267,7 @@ mod tests {
     }
 
     fn mapper(execution: Execution) -> DenseMapper {
-        DenseMapper::new(&DenseConfig::default(), &scene::camera(), execution).unwrap()
+        DenseMapper::new(&DenseConfig::default(), &scene::camera(), execution, &MapFrame::of_camera()).unwrap()
     }
 
     #[test]
@@ -382,7 +387,7 @@ mod tests {
         let error = mapper(Execution::Inline).with_earlier(dense_map.clone(), &Map::default()).err().unwrap();
         assert!(error.to_string().contains("keyframe 2"), "{error}");
         let other = DenseConfig { stride_px: 4, ..Default::default() };
-        let other = DenseMapper::new(&other, &scene::camera(), Execution::Inline).unwrap();
+        let other = DenseMapper::new(&other, &scene::camera(), Execution::Inline, &MapFrame::of_camera()).unwrap();
         let error = other.with_earlier(dense_map, &map).err().unwrap().to_string();
         assert!(error.contains("cells of 2 px") && error.contains("dense.stride_px = 2"), "{error}");
     }

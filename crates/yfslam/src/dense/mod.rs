@@ -20,6 +20,7 @@ mod fusion;
 mod gravity;
 mod grid;
 mod keyframe_patch;
+mod map_frame;
 mod mapper;
 #[cfg(test)]
 mod memory_tests;
@@ -43,6 +44,7 @@ pub use cloud::{CloudPoint, cloud};
 pub use gravity::Up;
 pub use grid::{GridCell, GroundGrid, ground_grid};
 pub use keyframe_patch::{CellGrid, KeyframePatch};
+pub use map_frame::MapFrame;
 pub(crate) use mapper::{DenseMapper, Source};
 pub use mesh::{Mesh, mesh};
 pub(crate) use shutter::RowShift;
@@ -120,6 +122,8 @@ pub struct DenseMap {
     pub unmerged: Vec<(usize, PlacedPatch)>,
     /// Names of the classes of cells, from class 1 on; empty if no detector searched for static objects.
     pub class_names: Vec<String>,
+    /// The map frame, once it is fixed.
+    pub frame: Option<MapFrame>,
 }
 
 /// A keyframe patch with its pose.
@@ -169,7 +173,13 @@ impl DenseMap {
             unmerged: Vec::new(),
             grid,
             class_names: Vec::new(),
+            frame: None,
         }
+    }
+
+    /// Returns the map frame: the one that was saved with the map, else the one of its level surfaces.
+    pub fn frame(&self) -> MapFrame {
+        self.frame.unwrap_or_else(|| MapFrame::of_dense_map(self))
     }
 
     /// Returns the rotation after which the z-axis of the world points up.

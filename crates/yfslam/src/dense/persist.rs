@@ -1,16 +1,19 @@
 //! The dense map as bytes, as `yfslam run --dense` saves it.
 //!
 //! In: a dense map. Out: bytes, and back. The bytes are a file of their own, or the first part of a saved map, before the part of
-//! [`crate::map::persist`], whose keyframes they name. Depth and colour are stored as differences to the cell on the left, which
+//! [`crate::map::persist`], whose keyframes they name. The map frame follows in a section of its own. Depth and colour are stored as differences to the cell on the left, which
 //! compress better.
 
 use serde::{Deserialize, Serialize};
 
 use crate::dense::keyframe_patch::{CellGrid, KeyframePatch};
-use crate::dense::{DenseMap, PlacedPatch};
+use crate::dense::{DenseMap, MapFrame, PlacedPatch};
 use crate::map::camera_record::CameraRecord;
-use crate::map::container::{ContainerError, DENSE_MAP, MAP};
+use crate::map::container::{ContainerError, DENSE_MAP, Sections};
 use crate::map::persist::{pose_of, pose_record};
+
+/// Most cells of a map without patches.
+const MAX_CELLS: usize = 1 << 22;
 
 #[derive(Serialize, Deserialize)]
 struct Records {
@@ -40,13 +43,17 @@ struct PatchRecord {
 /// # Errors
 /// If it cannot be encoded, which would be a fault of this program.
 pub(super) fn encode(dense_map: &DenseMap) -> Result<Vec<u8>, ContainerError> {
-    DENSE_MAP.of_camera(dense_map.grid.camera()).pack(&Records {
+    let mut bytes = DENSE_MAP.of_camera(dense_map.grid.camera()).pack(&Records {
         camera: CameraRecord::of(dense_map.grid.camera()),
         stride_px: dense_map.grid.stride_px() as u32,
         class_names: dense_map.class_names.clone(),
         patches: dense_map.patches.iter().map(PatchRecord::of).collect(),
         unmerged: dense_map.unmerged.iter().map(|(at, placed)| (*at as u32, PatchRecord::of(placed))).collect(),
-    })
+    })?;
+    if let Some(frame) = &dense_map.frame {
+        bytes.extend(frame.to_bytes()?);
+    }
+    Ok(bytes)
 }
 
 /// Decodes and checks the dense map in `bytes`: a file of its own, or part of a saved map.
@@ -54,29 +61,27 @@ pub(super) fn encode(dense_map: &DenseMap) -> Result<Vec<u8>, ContainerError> {
 /// # Errors
 /// If the bytes are not a dense map, are of another version, truncated, altered or inconsistent, or are a map without a dense map.
 pub(super) fn decode(bytes: &[u8]) -> Result<DenseMap, ContainerError> {
-    if MAP.begins(bytes) {
-        return Err(ContainerError::NoPieces);
-    }
-    let (packed, map) = DENSE_MAP.split(bytes)?;
-    if !map.is_empty() {
-        MAP.whole(map)?;
-    }
+    let sections = Sections::of(bytes, DENSE_MAP)?;
+    let packed = sections.dense_map.ok_or(ContainerError::NoPieces)?;
     let Records { camera, stride_px, class_names, patches, unmerged } = packed.unpack()?;
-    let camera = camera.into_camera();
+    let frame = sections.frame.map(MapFrame::from_section).transpose()?;
+    let camera = camera.into_camera().map_err(ContainerError::Records)?;
     let invalid = |what: String| Err(ContainerError::Records(what));
     if stride_px == 0 || stride_px as usize > camera.width.min(camera.height) {
         return invalid(format!("cells of {stride_px} px in an image of {} × {}", camera.width, camera.height));
     }
-    // The grid is allocated from these numbers: a corrupt file must not exhaust the memory.
-    if camera.width.saturating_mul(camera.height) > 1 << 28 {
-        return invalid(format!("an image size of {} × {} px is too large", camera.width, camera.height));
+    // The grid is allocated from these numbers, so each patch must have as many cells, and a map without patches a usual number.
+    let cells = (camera.width / stride_px as usize) * (camera.height / stride_px as usize);
+    let all = || patches.iter().chain(unmerged.iter().map(|(_, record)| record));
+    if cells > MAX_CELLS && all().all(|record| record.depth.len() != cells) {
+        return invalid(format!("there are no patches with the {cells} cells that its camera has"));
     }
     let grid = CellGrid::new(&camera, stride_px as usize);
     let patch = |record: PatchRecord| record.into_patch(&grid, class_names.len());
     let patches = patches.into_iter().map(patch).collect::<Result<_, _>>()?;
     let unmerged = unmerged.into_iter().map(|(at, record)| Ok((at as usize, patch(record)?)));
     let unmerged = unmerged.collect::<Result<_, _>>()?;
-    Ok(DenseMap { patches, unmerged, grid, class_names })
+    Ok(DenseMap { patches, unmerged, grid, class_names, frame })
 }
 
 impl PatchRecord {
@@ -146,6 +151,7 @@ mod tests {
     use crate::config::FeatureConfig;
     use crate::dense::scene;
     use crate::map::Map;
+    use crate::map::container::MAP;
     use crate::map::scene::Scene;
 
     fn dense_map() -> DenseMap {
@@ -161,7 +167,8 @@ mod tests {
         patches[2].patch.depth.iter_mut().for_each(|d| *d |= 1 << 15);
         patches[0].patch = patches[0].patch.clone().with_classes(&grid, |[x, _]| u8::from(x < 20.0) * 2);
         let class_names = vec!["chair".to_owned(), "tv".to_owned()];
-        DenseMap { patches, unmerged: vec![(1, patch(7))], grid, class_names }
+        let frame = Some(MapFrame::of_camera());
+        DenseMap { patches, unmerged: vec![(1, patch(7))], grid, class_names, frame }
     }
 
     /// Returns the bytes of a map of one keyframe.
@@ -176,6 +183,24 @@ mod tests {
         let dense_map = dense_map();
         let read = decode(&encode(&dense_map).unwrap()).unwrap();
         assert_eq!(read, dense_map);
+    }
+
+    #[test]
+    fn a_camera_that_no_lens_has_and_a_grid_without_patches_are_refused_before_they_take_memory() {
+        let records = |camera: crate::Camera| {
+            let camera = CameraRecord::of(&camera);
+            let (class_names, patches, unmerged) = (Vec::new(), Vec::new(), Vec::new());
+            DENSE_MAP.pack(&Records { camera, stride_px: 1, class_names, patches, unmerged }).unwrap()
+        };
+        let pinhole = crate::Camera::pinhole;
+        for (camera, expected) in [
+            (pinhole(45, 660_907, 500.0, 500.0, 20.0, 300.0), "height is 660907"),
+            (pinhole(640, 480, 500.0, 500.0, 320.0, 1e9), "cy is 1000000000"),
+            (pinhole(16_384, 16_384, 16e3, 16e3, 8e3, 8e3), "no patches with the 268435456 cells"),
+        ] {
+            let error = decode(&records(camera)).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
     }
 
     #[test]

@@ -5,20 +5,21 @@
 use super::cloud::{CloudPoint, cloud};
 use super::grid::{GroundGrid, ground_grid};
 use super::mesh::{Mesh, mesh};
-use super::{DenseMap, DenseMapper, Volume};
+use super::{DenseMap, DenseMapper, MapFrame, Volume};
 use crate::map::Map;
 
-/// The present dense map, in the world of the submap that has most keyframe patches, turned so that the z-axis points up in the
-/// first image (ROS, REP 103). With [`Execution::Threaded`](crate::Execution::Threaded) each call waits until all patches are
+/// The present dense map of the submap that has most keyframe patches, in the map frame of the saved map that the session continues, else in
+/// that of an upright first image ([`MapFrame::of_camera`]). With [`Execution::Threaded`](crate::Execution::Threaded) each call waits until all patches are
 /// integrated.
 pub struct DenseView<'a> {
     mapper: &'a mut DenseMapper,
     map: &'a Map,
+    frame: Option<MapFrame>,
 }
 
 impl<'a> DenseView<'a> {
-    pub(crate) fn new(mapper: &'a mut DenseMapper, map: &'a Map) -> Self {
-        Self { mapper, map }
+    pub(crate) fn new(mapper: &'a mut DenseMapper, map: &'a Map, frame: Option<MapFrame>) -> Self {
+        Self { mapper, map, frame }
     }
 
     /// Returns occupied, free and unknown space.
@@ -28,7 +29,7 @@ impl<'a> DenseView<'a> {
 
     /// Returns a coloured point for each occupied voxel.
     pub fn cloud(&mut self) -> Vec<CloudPoint> {
-        cloud(&self.snapshot(), &self.volume(), |_| {})
+        cloud(&self.mapper.snapshot(self.map), &self.volume(), |_| {})
     }
 
     /// Returns the grid of obstacles between two heights, m, for navigation.
@@ -38,11 +39,14 @@ impl<'a> DenseView<'a> {
 
     /// Returns the coloured mesh of the surfaces.
     pub fn mesh(&mut self) -> Mesh {
-        mesh(&self.snapshot(), &self.volume(), |_, _| {})
+        mesh(&self.mapper.snapshot(self.map), &self.volume(), |_, _| {})
     }
 
-    /// Returns the keyframe patches with their poses, which can be saved and from which all products are made.
+    /// Returns the keyframe patches with their poses, which can be saved and from which all products are made. The map frame is fixed: that
+    /// of the level surfaces, if the session continues no saved map.
     pub fn snapshot(&mut self) -> DenseMap {
-        self.mapper.snapshot(self.map)
+        let mut dense_map = self.mapper.snapshot(self.map);
+        dense_map.frame = Some(self.frame.unwrap_or_else(|| MapFrame::of_dense_map(&dense_map)));
+        dense_map
     }
 }

@@ -124,6 +124,12 @@ pub trait DynamicFilter: Send + Sync {
         true
     }
 
+    /// Returns whether the next image has to be searched for people although `dynamic.detect_max_gap_s` has not passed: the filter cannot tell
+    /// from the last one where they are.
+    fn wants_detections(&self) -> bool {
+        true
+    }
+
     /// Returns whether the visibility check removes landmarks from the map where the measured depth proves free space.
     fn checks_visibility(&self) -> bool {
         false

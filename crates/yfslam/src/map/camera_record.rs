@@ -23,8 +23,13 @@ impl CameraRecord {
         Self(camera.clone())
     }
 
-    pub(crate) fn into_camera(self) -> Camera {
-        self.0
+    /// Returns the camera.
+    ///
+    /// # Errors
+    /// No camera can have the calibration: a file may have been written by anyone.
+    pub(crate) fn into_camera(self) -> Result<Camera, String> {
+        self.0.check().map_err(|error| format!("the camera: {error}"))?;
+        Ok(self.0)
     }
 }
 
@@ -94,7 +99,7 @@ mod tests {
             // The record stands among others.
             let bytes = postcard::to_allocvec(&(CameraRecord::of(&camera), 7u64)).unwrap();
             let (record, next): (CameraRecord, u64) = postcard::from_bytes(&bytes).unwrap();
-            assert_eq!((record.into_camera(), next), (camera, 7));
+            assert_eq!((record.0, next), (camera, 7));
         }
     }
 }

@@ -4,8 +4,8 @@
 //! magic · version u16 · length of the rest u64 · CRC-32 of the rest u32 │ zstd(postcard(records))
 //! ```
 //!
-//! Numbers of the header are little-endian. A file may have several sections: `yfslam run --dense --save-map` writes [`DENSE_MAP`], then
-//! [`MAP`]. In: records. Out: bytes; and the reverse, with checks. This module does not access files.
+//! Numbers of the header are little-endian. A file may have several sections: `yfslam run --dense --save-map` writes [`DENSE_MAP`],
+//! [`FRAME`], then [`MAP`]. In: records. Out: bytes; and the reverse, with checks. This module does not access files.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -27,6 +27,40 @@ pub(crate) struct Section {
 pub(crate) const MAP: Section = Section { magic: "yfslam map", version: 1, rational_version: 2 };
 /// Section with the keyframe patches of a dense map.
 pub(crate) const DENSE_MAP: Section = Section { magic: "yfslam dense map", version: 3, rational_version: 4 };
+/// Section with the map frame.
+pub(crate) const FRAME: Section = Section { magic: "yfslam frame", version: 1, rational_version: 1 };
+
+/// The sections of a file. Their lengths and checksums are right.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Sections<'a> {
+    pub(crate) dense_map: Option<PackedSection<'a>>,
+    pub(crate) frame: Option<PackedSection<'a>>,
+    pub(crate) map: Option<PackedSection<'a>>,
+}
+
+impl<'a> Sections<'a> {
+    /// Splits a file into its sections, of which one is `expected`.
+    ///
+    /// # Errors
+    /// If there is no section, a section has another version, or is truncated or altered, or other bytes follow.
+    pub(crate) fn of(bytes: &'a [u8], expected: Section) -> Result<Self, ContainerError> {
+        let (mut sections, mut rest) = (Self::default(), bytes);
+        let Self { dense_map, frame, map } = &mut sections;
+        for (section, place) in [(DENSE_MAP, dense_map), (FRAME, frame), (MAP, map)] {
+            if section.begins(rest) {
+                let (packed, after) = section.split(rest)?;
+                (*place, rest) = (Some(packed), after);
+            }
+        }
+        match (bytes.len(), rest.len()) {
+            (_, 0) if !bytes.is_empty() => Ok(sections),
+            (found, left) if left < found => {
+                Err(ContainerError::Length { found: found as u64, announced: (found - left) as u64 })
+            }
+            _ => Err(ContainerError::Foreign(expected.magic)),
+        }
+    }
+}
 
 /// Reason why bytes cannot be read as a saved map.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -128,27 +162,6 @@ impl Section {
             return Err(ContainerError::Checksum { found, announced });
         }
         Ok((PackedSection(packed), rest))
-    }
-
-    /// Returns the compressed records of `bytes` that hold this section only.
-    ///
-    /// # Errors
-    /// If the bytes hold another type or version of section, or are truncated, extended or altered.
-    pub(crate) fn whole(self, bytes: &[u8]) -> Result<PackedSection<'_>, ContainerError> {
-        let (packed, rest) = self.split(bytes)?;
-        if rest.is_empty() {
-            return Ok(packed);
-        }
-        let found = bytes.len() as u64;
-        Err(ContainerError::Length { found, announced: found - rest.len() as u64 })
-    }
-
-    /// Reads the records of `bytes` that hold this section only.
-    ///
-    /// # Errors
-    /// As [`Section::whole`], or if the records cannot be deserialised.
-    pub(crate) fn unpack<T: DeserializeOwned>(self, bytes: &[u8]) -> Result<T, ContainerError> {
-        self.whole(bytes)?.unpack()
     }
 }
 

@@ -12,7 +12,7 @@ use crate::config::{Config, FeatureConfig};
 use crate::features::{Descriptor, Feature, FrameFeatures, ImageBounds, OrbExtractor};
 use crate::geometry::Pose;
 use crate::map::camera_record::CameraRecord;
-use crate::map::container::{DENSE_MAP, MAP};
+use crate::map::container::{MAP, Sections};
 use crate::map::{KeyFrameId, LandmarkId, Map};
 
 /// Reason why bytes cannot be read as a saved map.
@@ -80,14 +80,13 @@ pub(crate) fn encode(map: &Map, camera: &Camera, features: &FeatureConfig) -> Re
     MAP.of_camera(camera).pack(&Records::of(map, camera, features))
 }
 
-/// Reads and checks a map. The section of a dense map before it is verified and skipped.
+/// Reads and checks a map. The sections before it are verified and skipped.
 ///
 /// # Errors
 /// If the bytes are not a map, have another version, are truncated or altered, or if the records are inconsistent.
 pub(crate) fn decode(bytes: &[u8]) -> Result<MapParts, MapError> {
-    let map = if DENSE_MAP.begins(bytes) { DENSE_MAP.split(bytes)?.1 } else { bytes };
-    let records: Records = MAP.unpack(map)?;
-    records.into_map().map_err(MapError::Records)
+    let packed = Sections::of(bytes, MAP)?.map.ok_or(MapError::Foreign(MAP.magic))?;
+    packed.unpack::<Records>()?.into_map().map_err(MapError::Records)
 }
 
 impl Records {
@@ -133,7 +132,7 @@ impl Records {
     }
 
     fn into_map(self) -> Result<MapParts, String> {
-        let camera = self.camera.into_camera();
+        let camera = self.camera.into_camera()?;
         let config = Config { features: self.features.clone(), ..Default::default() };
         config.validate().map_err(|error| error.to_string())?;
         let extractor = OrbExtractor::new(&self.features);

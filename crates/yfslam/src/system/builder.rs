@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::{FrameDetections, Readout, ReadoutSearch, SavedMap, SetupError, Slam, Statistics};
+use super::{DetectionDemand, FrameDetections, Readout, ReadoutSearch, SavedMap, SetupError, Slam, Statistics};
 use crate::backend::{Backend, MapOwner};
 use crate::camera::Camera;
 use crate::config::{Config, DenseConfig, DepthSource, ReadoutEstimation};
 use crate::context::Context;
-use crate::dense::{DenseMap, DenseMapper};
+use crate::dense::{DenseMap, DenseMapper, MapFrame};
 use crate::detect::Detector;
 use crate::detect::detector_worker::DetectorWorker;
 use crate::detect::roll_compensation::GravityDirection;
@@ -102,10 +102,11 @@ impl SlamBuilder {
     /// Builds the system and starts its threads.
     ///
     /// # Errors
-    /// If the configuration holds a value out of range, the detector lacks a movable class, a stereo camera is not rectified, the saved
+    /// If no camera can have the calibration, the configuration holds a value out of range, the detector lacks a movable class, a stereo camera is not rectified, the saved
     /// map does not fit the camera or the configuration, a dense map is wanted without depth images, or a thread cannot be started.
     pub fn build(self) -> Result<Slam, SetupError> {
         let Self { camera, config, detector, filter, execution, map, dense } = self;
+        camera.check()?;
         config.validate()?;
         let extractor = OrbExtractor::new(&config.features);
         let context = Arc::new(Context::new(&camera, &config, extractor.scale_factors()));
@@ -114,14 +115,16 @@ impl SlamBuilder {
         if let (Some(saved), Some(map_use)) = (&saved, map_use) {
             check_map(saved, map_use, &context)?;
         }
-        let (map, earlier) = saved.map_or_else(Default::default, |saved| (saved.map, saved.dense));
+        let (map, earlier, saved_frame) =
+            saved.map_or_else(Default::default, |saved| (saved.map, saved.dense, saved.frame));
         let first_keyframe = map.keyframes_ever();
         let needs_boxes = filter.as_ref().map_or(config.dynamic.method.needs_boxes(), |filter| filter.needs_boxes());
         // A filter that uses no boxes needs no detector.
         let detector = detector.filter(|_| needs_boxes);
         let detections = FrameDetections::new(&config.dynamic, detector.as_deref())?;
         let earlier = earlier.filter(|_| map_use == Some(MapUse::Extend));
-        let mut dense = dense_mapper(dense, &context, execution, earlier, &map)?;
+        let frame = saved_frame.unwrap_or_else(MapFrame::of_camera);
+        let mut dense = dense_mapper(dense, &context, execution, &frame, earlier, &map)?;
         if let Some(dense) = dense.as_mut().filter(|_| detections.detects_static_classes()) {
             dense.name_classes(&detections.class_names);
         }
@@ -135,7 +138,9 @@ impl SlamBuilder {
             needs_boxes,
             detector: detector.map(DetectorWorker::spawn).transpose()?,
             detections,
+            demand: DetectionDemand::default(),
             dense,
+            saved_frame,
             last_timestamp_ns: None,
             unknown_frames: 0,
             map_use,
@@ -208,6 +213,7 @@ fn dense_mapper(
     wanted: Option<DenseConfig>,
     context: &Context,
     execution: Execution,
+    frame: &MapFrame,
     earlier: Option<DenseMap>,
     map: &Map,
 ) -> Result<Option<DenseMapper>, SetupError> {
@@ -215,7 +221,7 @@ fn dense_mapper(
     if context.config.depth.source != DepthSource::Image {
         return Err(SetupError::DenseWithoutDepth);
     }
-    let mapper = DenseMapper::new(&config, &context.sensor.camera, execution)?;
+    let mapper = DenseMapper::new(&config, &context.sensor.camera, execution, frame)?;
     Ok(Some(match earlier {
         Some(earlier) => mapper.with_earlier(earlier, map)?,
         None => mapper,

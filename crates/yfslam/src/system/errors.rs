@@ -1,5 +1,6 @@
 //! What can be wrong with a setup or a frame.
 
+use crate::camera::CameraError;
 use crate::config::ConfigError;
 use crate::dense::DenseError;
 
@@ -14,12 +15,15 @@ pub enum SetupError {
         /// The classes the detector has.
         known: String,
     },
+    /// A calibration that no camera can have.
+    #[error("the camera: {0}")]
+    Camera(#[from] CameraError),
     /// A value of the configuration with which nothing can work.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// A stereo camera with lens distortion: points do not lie in the same row of both pictures.
+    /// A stereo camera with lens distortion: points do not lie in the same row of both images.
     #[error(
-        "depth.source is `stereo`, but the camera has distortion {0:?}: rectify the pictures and give the calibration without distortion"
+        "depth.source is `stereo`, but the camera has distortion {0:?}: rectify the images and give the calibration without distortion"
     )]
     NotRectified([f64; 5]),
     /// A map made with other feature settings.

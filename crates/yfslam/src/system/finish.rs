@@ -5,7 +5,7 @@ use nalgebra::Matrix6;
 use super::{Anchor, Pass, Slam, Tracked};
 use crate::dense::{RowShift, Source};
 use crate::frame::Frame;
-use crate::tracking::{LostReason, TrackingState};
+use crate::tracking::{LostReason, TrackingStart, TrackingState};
 
 impl Slam {
     /// Ends the frame.
@@ -17,6 +17,7 @@ impl Slam {
         mut pass: Pass,
     ) -> Tracked {
         let tracked = localised.is_ok();
+        let start = if tracked { self.tracking_start(&pass) } else { None };
         let covariance = if tracked { self.covariance(&pass) } else { None };
         self.state = match (tracked, self.state) {
             (true, _) => TrackingState::Tracking,
@@ -38,9 +39,22 @@ impl Slam {
             covariance,
             inliers: self.tracker.inliers,
             is_keyframe,
+            start,
             lost_reason: localised.err(),
             loop_closure: pass.loop_closure,
             times: pass.times,
+        }
+    }
+
+    /// How tracking begins with a tracked frame, if it does.
+    fn tracking_start(&self, pass: &Pass) -> Option<TrackingStart> {
+        match self.state {
+            TrackingState::Tracking => None,
+            // A camera without depth begins a map with two frames, and recognises places until then.
+            TrackingState::NotInitialized if pass.map_begun || self.context.sensor.measures_depth => {
+                Some(TrackingStart::NewMap)
+            }
+            TrackingState::NotInitialized | TrackingState::Lost => Some(TrackingStart::Recognised),
         }
     }
 

@@ -6,7 +6,7 @@ use crate::tracking::TrackingState;
 
 impl Slam {
     /// Inserts a tracked frame as a keyframe if the map needs one. Returns whether the frame is a keyframe.
-    pub(super) fn map_frame(&mut self, frame: &Frame, tracked: bool, pass: &mut Pass) -> bool {
+    pub(super) fn extend_map(&mut self, frame: &Frame, tracked: bool, pass: &mut Pass) -> bool {
         if pass.map_begun {
             return true;
         }

@@ -1,6 +1,7 @@
 //! The whole path from a frame to its pose: sense, localise, map, finish.
 
 mod builder;
+mod detection_demand;
 mod errors;
 mod finish;
 mod frame_detections;
@@ -18,7 +19,7 @@ use std::sync::Arc;
 
 use crate::backend::MapOwner;
 use crate::context::Context;
-use crate::dense::DenseMapper;
+use crate::dense::{DenseMapper, MapFrame};
 use crate::detect::detector_worker::DetectorWorker;
 use crate::detect::roll_compensation::GravityDirection;
 use crate::dynamic::DynamicFilter;
@@ -32,6 +33,7 @@ use crate::loops::LoopClosure;
 use crate::map::KeyFrameId;
 use crate::tracking::{Tracker, TrackingState, TwoViewInitialiser};
 pub use builder::{MapUse, SlamBuilder};
+use detection_demand::DetectionDemand;
 pub use errors::{FrameRejected, SetupError};
 use frame_detections::FrameDetections;
 pub use results::Statistics;
@@ -68,7 +70,10 @@ pub struct Slam {
     needs_boxes: bool,
     detector: Option<DetectorWorker>,
     detections: FrameDetections,
+    demand: DetectionDemand,
     dense: Option<DenseMapper>,
+    /// The map frame of the saved map that this session continues.
+    saved_frame: Option<MapFrame>,
     last_timestamp_ns: Option<i64>,
     /// Frames since the camera was lost that showed enough for a map and were not recognised.
     unknown_frames: usize,
@@ -111,7 +116,7 @@ impl Slam {
         // The pose from the last frame and the local map, or from place recognition.
         let localised = self.localise(frame, &mut pass);
         // A keyframe, landmarks, local bundle adjustment, loops.
-        let is_keyframe = self.map_frame(frame, localised.is_ok(), &mut pass);
+        let is_keyframe = self.extend_map(frame, localised.is_ok(), &mut pass);
         Ok(self.finish(frame, localised, is_keyframe, pass))
     }
 }

@@ -1,7 +1,7 @@
 //! What can be asked of the system between frames.
 
-use super::{Readout, Slam};
-use crate::dense::{DenseError, DenseView};
+use super::{MapUse, Readout, Slam};
+use crate::dense::{DenseError, DenseMapper, DenseView, MapFrame};
 use crate::detect::Detection;
 use crate::dynamic::Region;
 use crate::features::Feature;
@@ -21,6 +21,8 @@ pub struct Statistics {
     pub keyframes_skipped: usize,
     /// Times that the map was begun anew because tracking was lost soon after the start. Earlier poses belong to another world.
     pub resets: usize,
+    /// Frames that were to be searched for people.
+    pub frames_searched: usize,
     /// Frames on which the detector failed.
     pub detector_failures: usize,
     /// Frames in which nothing searched for people although the filter needs that.
@@ -44,6 +46,11 @@ impl Slam {
     /// loop that it closed.
     pub fn finish_mapping(&mut self) -> Option<LoopClosure> {
         self.owner.finish()?.loop_closure
+    }
+
+    /// Returns how the map of an earlier session is used; `None` if there is none.
+    pub fn map_use(&self) -> Option<MapUse> {
+        self.map_use
     }
 
     /// Returns the counts of this session.
@@ -124,8 +131,8 @@ impl Slam {
     #[cfg(feature = "persist")]
     pub fn save_map(&mut self) -> Result<Vec<u8>, MapError> {
         let mut bytes = match &mut self.dense {
-            Some(dense) => dense.snapshot(self.owner.map()).to_bytes()?,
-            None => Vec::new(),
+            Some(dense) => DenseView::new(dense, self.owner.map(), self.saved_frame).snapshot().to_bytes()?,
+            None => self.map_frame().to_bytes()?,
         };
         bytes.extend(encode(self.map(), &self.context.sensor.camera, &self.context.config.features)?);
         Ok(bytes)
@@ -137,6 +144,14 @@ impl Slam {
     /// If the system was built without one.
     pub fn dense(&mut self) -> Result<DenseView<'_>, DenseError> {
         let mapper = self.dense.as_mut().ok_or(DenseError::Disabled)?;
-        Ok(DenseView::new(mapper, self.owner.map()))
+        Ok(DenseView::new(mapper, self.owner.map(), self.saved_frame))
+    }
+
+    /// Returns the map frame: that of the saved map that the session continues, else the one that a map saved now would get, from the level
+    /// surfaces of the dense map or, without one, from an upright first image.
+    pub fn map_frame(&mut self) -> MapFrame {
+        let (saved, dense) = (self.saved_frame, &mut self.dense);
+        let of_dense = |dense: &mut DenseMapper| MapFrame::of_dense_map(&dense.snapshot(self.owner.map()));
+        saved.or_else(|| dense.as_mut().map(of_dense)).unwrap_or_else(MapFrame::of_camera)
     }
 }

@@ -2,10 +2,10 @@
 
 use crate::camera::Camera;
 use crate::config::FeatureConfig;
-use crate::dense::DenseMap;
+use crate::dense::{DenseMap, MapFrame};
 use crate::map::Map;
 #[cfg(feature = "persist")]
-use crate::map::container::DENSE_MAP;
+use crate::map::container::{MAP, Sections};
 #[cfg(feature = "persist")]
 use crate::map::persist::{MapError, MapParts, decode};
 
@@ -17,6 +17,7 @@ pub struct SavedMap {
     /// Feature settings: with others nothing would be recognised.
     pub(crate) features: FeatureConfig,
     pub(crate) dense: Option<DenseMap>,
+    pub(crate) frame: Option<MapFrame>,
 }
 
 impl SavedMap {
@@ -27,8 +28,10 @@ impl SavedMap {
     #[cfg(feature = "persist")]
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, MapError> {
         let MapParts { map, camera, features } = decode(bytes)?;
-        let dense = DENSE_MAP.begins(bytes).then(|| DenseMap::from_bytes(bytes)).transpose()?;
-        Ok(Self { map, camera, features, dense })
+        let sections = Sections::of(bytes, MAP)?;
+        let dense = sections.dense_map.map(|_| DenseMap::from_bytes(bytes)).transpose()?;
+        let frame = sections.frame.map(MapFrame::from_section).transpose()?;
+        Ok(Self { map, camera, features, dense, frame })
     }
 
     /// Returns the keyframes and landmarks.
@@ -39,5 +42,10 @@ impl SavedMap {
     /// Returns the dense map that was saved with it.
     pub fn dense(&self) -> Option<&DenseMap> {
         self.dense.as_ref()
+    }
+
+    /// Returns the map frame; `None` in files of programs that did not know it.
+    pub fn frame(&self) -> Option<MapFrame> {
+        self.frame
     }
 }

@@ -63,13 +63,25 @@ impl Slam {
 
     /// Hands the image to the detector if detections are due and the frame does not bring its own. Returns whether they are due.
     fn start_detector(&mut self, frame: &Frame) -> bool {
-        let due = self.statistics.frames.is_multiple_of(self.context.config.dynamic.detect_every);
+        let due = self.detections_are_due(frame.timestamp_ns);
         self.statistics.frames += 1;
+        self.statistics.frames_searched += usize::from(due && self.needs_boxes);
         let roll_deg = self.roll_deg();
         if let Some(detector) = self.detector.as_mut().filter(|_| due && frame.detections.is_none()) {
             detector.start(&frame.color, roll_deg);
         }
         due
+    }
+
+    /// Returns whether the image of `timestamp_ns` is to be searched for people.
+    fn detections_are_due(&mut self, timestamp_ns: i64) -> bool {
+        let config = &self.context.config.dynamic;
+        if !self.statistics.frames.is_multiple_of(config.detect_every) {
+            return false;
+        }
+        let is_tracking = self.state == TrackingState::Tracking;
+        let expected = is_tracking.then(|| self.tracker.predict(self.owner.map()));
+        self.demand.is_due(config.detect_max_gap_s, timestamp_ns, expected, self.filter.wants_detections())
     }
 
     /// Returns how far the next image has to be turned to be upright, in degrees, as far as that is known before its pose: the angle for

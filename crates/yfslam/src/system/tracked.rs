@@ -5,7 +5,7 @@ use nalgebra::Matrix6;
 use super::StageTimes;
 use crate::geometry::Pose;
 use crate::loops::LoopClosure;
-use crate::tracking::{LostReason, TrackingState};
+use crate::tracking::{LostReason, TrackingStart, TrackingState};
 
 /// The result of one frame.
 #[derive(Clone, Debug)]
@@ -25,6 +25,8 @@ pub struct Tracked {
     pub inliers: usize,
     /// Whether the frame became a keyframe, or was handed over to become one.
     pub is_keyframe: bool,
+    /// How tracking began with this frame; `None` if the frame before was tracked too, or this one is not.
+    pub start: Option<TrackingStart>,
     /// Why the pose is not known; `None` while tracking.
     pub lost_reason: Option<LostReason>,
     /// The loop that a keyframe closed, this one or, with mapping on its own thread, an earlier one: all poses may have changed.

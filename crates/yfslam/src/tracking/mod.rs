@@ -26,7 +26,7 @@ use motion::{Interval, weighted};
 use nalgebra::{Matrix6, Vector6};
 pub(crate) use readout_estimator::ReadoutEstimator;
 use search::{search_keyframe, search_last_frame, search_local_map};
-pub use state::{LostReason, TrackingState};
+pub use state::{LostReason, TrackingStart, TrackingState};
 pub(crate) use tracked_frame::{Match, TrackedFrame};
 pub(crate) use two_view_initialiser::{StartFrame, TwoViewInitialiser, TwoViewMap};
 use visibility_check::is_free_space;

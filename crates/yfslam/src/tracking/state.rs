@@ -12,6 +12,15 @@ pub enum TrackingState {
     Lost,
 }
 
+/// How tracking has begun, or resumed after the camera was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrackingStart {
+    /// A map or a submap was begun with the frame: its pose has no known relation to that of earlier frames.
+    NewMap,
+    /// A place of the map was recognised: the pose is in the world of that map.
+    Recognised,
+}
+
 /// Reason why the pose of a frame is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

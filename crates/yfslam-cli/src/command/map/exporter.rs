@@ -6,19 +6,21 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use yfslam::dense::{
-    Background, Backgrounds, Classes, CloudPoint, DenseMap, GridCell, KnownVoxel, Volume, cloud, ground_grid, mesh,
+    Background, Backgrounds, Classes, CloudPoint, DenseMap, GridCell, KnownVoxel, PlacedPatch, Volume, cloud,
+    ground_grid, mesh,
 };
-use yfslam::{Image, RgbImage};
+use yfslam::{Image, MapFrame, RgbImage};
 use yfslam_io::write::{
-    Labels, OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png, write_nav2,
-    write_octomap, write_pcd, write_ply, write_ply_mesh,
+    Coordinates, Labels, OctreeFormat, OctreeVoxel, PlyPoint, write_color_png, write_depth_png, write_mask_png,
+    write_nav2, write_octomap, write_pcd, write_ply, write_ply_mesh,
 };
-use yfslam_io::{prepare_folder, write_atomically};
+use yfslam_io::{StampedPose, prepare_folder, write_atomically, write_trajectory};
 
 use super::options::HeightBand;
 use crate::draw::colors::{FREE, class_color};
 use crate::draw::dense_image::{SHOWN_M, from_above, from_corner};
 use crate::output::class_legend::ClassLegend;
+use crate::output::map_frame;
 use crate::ui::progress::Progress;
 use crate::ui::terminal::Terminal;
 
@@ -32,6 +34,8 @@ const IMAGE_PX: [usize; 2] = [900, 600];
 /// Exports one volume.
 pub struct Exporter<'a> {
     pub map: &'a DenseMap,
+    /// The frame of all products.
+    pub frame: MapFrame,
     pub volume: Volume,
     /// Classes of the voxels; `None` if the detector of the run had none.
     pub classes: Option<Classes>,
@@ -42,6 +46,17 @@ pub struct Exporter<'a> {
 }
 
 impl Exporter<'_> {
+    /// Writes the transformation into the frame of the products, and the path of the camera in it.
+    pub fn frame(&self) -> Result<String> {
+        map_frame::write(&self.folder, &self.frame)?;
+        let t_map_world = self.frame.t_map_world();
+        let pose = |placed: &PlacedPatch| StampedPose::new(placed.timestamp_ns, t_map_world * placed.t_world_cam);
+        let mut path: Vec<StampedPose> = self.map.patches.iter().map(pose).collect();
+        path.sort_by_key(|pose| pose.timestamp_ns);
+        write_trajectory(&self.folder.join("path.txt"), &path)?;
+        Ok(String::new())
+    }
+
     /// Writes the point cloud and images of it.
     pub fn cloud(&self) -> Result<String> {
         let work = |report: &mut dyn FnMut(usize)| cloud(self.map, &self.volume, report);
@@ -50,7 +65,7 @@ impl Exporter<'_> {
         let point_classes: Option<Vec<u8>> =
             self.classes.as_ref().map(|classes| points.iter().map(|p| classes.get(p.voxel)).collect());
         let labels = point_classes.as_ref().map(|classes| Labels { classes, names: &self.map.class_names });
-        write_ply(&self.folder.join("cloud.ply"), points.iter().map(ply), labels)?;
+        write_ply(&self.folder.join("cloud.ply"), Coordinates::Map, points.iter().map(ply), labels)?;
         write_pcd(&self.folder.join("cloud.pcd"), points.iter().map(ply), labels)?;
         let resolution_m = self.volume.config().resolution_m;
         let cut_m = self.floor_m + SHOWN_M;
@@ -119,7 +134,7 @@ impl Exporter<'_> {
         progress.into_iter().for_each(Progress::finish);
         let vertices = mesh.vertices_m.iter().zip(&mesh.colors);
         let vertices = vertices.map(|(&position_m, &color)| PlyPoint { position_m, color });
-        write_ply_mesh(&self.folder.join("mesh.ply"), vertices, &mesh.triangles)?;
+        write_ply_mesh(&self.folder.join("mesh.ply"), Coordinates::Map, vertices, &mesh.triangles)?;
         Ok(format!("mesh: {} vertices, {} triangles\n", mesh.vertices_m.len(), mesh.triangles.len()))
     }
 

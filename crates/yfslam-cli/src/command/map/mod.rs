@@ -9,7 +9,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
+use yfslam::MapFrame;
 use yfslam::dense::classes;
 use yfslam::dense::{DenseConfig, DenseMap, check_products};
 use yfslam_io::{prepare_folder, read_file};
@@ -18,6 +19,7 @@ use self::exporter::{Exporter, with_progress};
 use self::options::{HeightBand, Up};
 use crate::input::settings::SettingsArgs;
 use crate::output::dense::DENSE_FILE;
+use crate::output::folder::PRODUCTS_FOLDER;
 use crate::stats::cpu;
 use crate::ui::failures::Failures;
 use crate::ui::interrupt::Interrupt;
@@ -37,6 +39,8 @@ Files in the output folder:
   octomap.bt, octomap.ot    with --octomap, for OctoMap: free or occupied, and log-odds
   grid.pgm, grid.yaml       with --grid, for the ROS navigation stack
   mesh.ply                  with --mesh, coloured triangles
+  path.txt                  poses of the keyframes in the frame of the products, as lines of TUM
+  T_map_world.txt           transformation from the world of the run to this frame
   background/               with --background, the keyframes with most people: original image, image without people, depth image
                             (1/5000 m) and mask of the known pixels
 
@@ -50,13 +54,15 @@ Classes:
   semantic.ot               with --octomap, the octree coloured by class
   classes.json              numbers, names, colours and voxel counts of the classes
 
-Up direction (--up):
+Up direction (--up), if it is not to be that of the map frame:
   level     from horizontal surfaces in the map, such as floor, tables and ceiling
   camera    from the first image, which is assumed to be upright
   X,Y,Z     a direction in the world of the run
 
 Coordinates:
-  z points up, x to the front of the first image, y to its left (ROS, REP 103).";
+  All products are in the frame `map`: z points up, x to the front of the first image, y to its left (ROS, REP 103), the origin is the
+  first camera. It is fixed when a map is saved for the first time, and later sessions keep it. The trajectory of a run is in the
+  world of its keyframes, the first camera; T_map_world.txt has the transformation.";
 
 /// Make point clouds, octrees, grids and meshes without people from the dense map of a run.
 #[derive(Args, Debug)]
@@ -89,9 +95,9 @@ pub struct DenseMapArgs {
     /// Configuration file; its section `dense` is used.
     #[arg(short, long, value_name = "FILE.toml", help_heading = "Map")]
     config: Option<PathBuf>,
-    /// Up direction: `level`, `camera`, or X,Y,Z.
-    #[arg(long, value_name = "UP", default_value = "level", allow_hyphen_values = true, help_heading = "Map")]
-    up: Up,
+    /// Another up direction than that of the map frame: `level`, `camera`, or X,Y,Z. The products then do not fit T_map_world.txt of the run.
+    #[arg(long, value_name = "UP", allow_hyphen_values = true, help_heading = "Map")]
+    up: Option<Up>,
     /// Heights above the floor between which the grid has obstacles, m.
     #[arg(long, value_name = "LOW,HIGH", default_value = "0.1,1.8", help_heading = "Map")]
     band: HeightBand,
@@ -109,7 +115,8 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     let (map, folder) = args.open()?;
     prepare_folder(&folder).with_context(|| format!("the output folder {} cannot be used", folder.display()))?;
     terminal.note(&printer::memory_bound(&config, &map));
-    let turn = args.turn(&map);
+    let frame = args.frame(&map);
+    let turn = frame.r_map_world;
     let started = Instant::now();
     let work = |report: &mut dyn FnMut(usize)| map.volume(&config, &turn, report);
     let (volume, cpu) = cpu::timed(|| with_progress(terminal, "occupancy", &map, work));
@@ -120,11 +127,12 @@ pub fn run(args: &DenseMapArgs, terminal: Terminal) -> Result<()> {
     let work = |report: &mut dyn FnMut(usize)| classes(&map, &volume, report);
     let classes = (!map.class_names.is_empty()).then(|| with_progress(terminal, "classes", &map, work));
     text += &printer::floor(&map, &turn, floor_m);
-    let exporter = Exporter { map: &map, volume, classes, floor_m, folder, terminal };
+    let exporter = Exporter { map: &map, frame, volume, classes, floor_m, folder, terminal };
     let all = !(args.cloud || args.octomap || args.grid || args.mesh || args.background);
     // Nothing is written if a product would take too much memory.
     check_products(&exporter.volume, args.cloud || all, args.mesh || all)?;
-    let products: [(bool, &dyn Fn() -> Result<String>); 6] = [
+    let products: [(bool, &dyn Fn() -> Result<String>); 7] = [
+        (true, &|| exporter.frame()),
         (true, &|| exporter.legend()),
         (args.cloud || all, &|| exporter.cloud()),
         (args.octomap || all, &|| exporter.octomap()),
@@ -162,15 +170,18 @@ impl DenseMapArgs {
         })?;
         let map = DenseMap::from_bytes(&bytes).with_context(|| format!("{} cannot be used", file.display()))?;
         ensure!(!map.patches.is_empty(), "{} holds no keyframe: the run tracked nothing", file.display());
-        let beside = || file.parent().unwrap_or(Path::new(".")).join("map");
+        let beside = || file.parent().unwrap_or(Path::new(".")).join(PRODUCTS_FOLDER);
         Ok((map, self.out.clone().unwrap_or_else(beside)))
     }
 
-    fn turn(&self, map: &DenseMap) -> UnitQuaternion<f64> {
-        map.turn(match self.up {
+    /// Returns the frame of the products: that of the map, unless --up gives another.
+    fn frame(&self, map: &DenseMap) -> MapFrame {
+        let Some(up) = self.up else { return map.frame() };
+        let up = match up {
             Up::Level => yfslam::dense::Up::Level,
             Up::Camera => yfslam::dense::Up::Camera,
             Up::Direction(up) => yfslam::dense::Up::Direction(Vector3::from(up)),
-        })
+        };
+        MapFrame { r_map_world: map.turn(up), up }
     }
 }

@@ -55,6 +55,7 @@ Files in the output folder:
   keyframes.txt   final poses of the keyframes
   live.txt        poses of all tracked frames as estimated at the time of each frame
   map.ply         landmarks with colour
+  T_map_world.txt transformation from the world of these files to the frame of `yfslam map`, in which z points up
   run.json        input, counts of frames, times, errors
   config.toml     the configuration of this run; --config repeats the run with it
   dense.map       with --dense, the input of `yfslam map`

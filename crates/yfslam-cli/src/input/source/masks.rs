@@ -10,10 +10,10 @@ use std::sync::Arc;
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 use yfslam::{Camera, Image};
-use yfslam_io::Sequence;
 use yfslam_io::decode::{ImageSize, decode_mask};
 use yfslam_io::sequence::lists::parse_file_list;
 use yfslam_io::time::format_stamp;
+use yfslam_io::{Sequence, read_file, read_text};
 
 use crate::stats::skip::Skip;
 
@@ -96,7 +96,7 @@ impl Masks {
     }
 
     fn read(&self, path: &Path) -> Result<Image<u8>> {
-        let bytes = std::fs::read(path).with_context(|| format!("cannot read the mask {}", path.display()))?;
+        let bytes = read_file(path).with_context(|| format!("cannot read the mask {}", path.display()))?;
         let mut mask = Image::default();
         decode_mask(&bytes, Some(self.size), &mut mask).with_context(|| format!("the mask {}", path.display()))?;
         Ok(mask)
@@ -109,7 +109,7 @@ fn read_list(folder: &Path) -> Result<Option<BTreeMap<i64, PathBuf>>> {
     if !path.is_file() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = read_text(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let (files, _) = parse_file_list(&text, &path)?;
     Ok(Some(files.into_iter().map(|file| (file.stamp_ns, folder.join(file.path))).collect()))
 }

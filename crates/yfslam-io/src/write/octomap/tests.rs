@@ -83,7 +83,7 @@ fn eight_equal_leaves_become_one_and_a_binary_tree_has_two_bytes_for_each_inner_
     let size = write(&path, 0.1, &cube(4, 2.0), OctreeFormat::Binary).unwrap();
     assert_eq!(size, OctreeSize { nodes: 15, leaves: 1 });
     let text = std::fs::read(&path).unwrap();
-    let header = b"# Octomap OcTree binary file\n#\nid OcTree\nsize 15\nres 0.1\ndata\n";
+    let header = b"# Octomap OcTree binary file\n# frame map: z up, x to the front of the first image, y to its left (REP 103), m\nid OcTree\nsize 15\nres 0.1\ndata\n";
     assert_eq!(&text[..header.len()], header);
     assert_eq!(text.len() - header.len(), 2 * 14);
 }
@@ -99,7 +99,10 @@ fn equal_blocks_become_one() {
     let size = write(&path, 0.1, &voxels, OctreeFormat::Binary).unwrap();
     // From the former leaf down to one voxel: eight leaves at the last level and seven at each level above.
     assert_eq!(size.leaves, 3 * 7 + 8);
-    let header = format!("# Octomap OcTree binary file\n#\nid OcTree\nsize {}\nres 0.1\ndata\n", size.nodes);
+    let header = format!(
+        "# Octomap OcTree binary file\n# frame map: z up, x to the front of the first image, y to its left (REP 103), m\nid OcTree\nsize {}\nres 0.1\ndata\n",
+        size.nodes
+    );
     assert_eq!(std::fs::read(&path).unwrap().len(), header.len() + 2 * (size.nodes - size.leaves));
 }
 

@@ -16,6 +16,7 @@ use crate::dynamic::full::second_motion::{SecondMotion, extent};
 use crate::dynamic::segment::depth_clusters::DepthClusters;
 use crate::dynamic::segment::mask::InstanceMask;
 use crate::dynamic::segment::segmenter::Segmenter;
+use crate::dynamic::track::Track;
 use crate::dynamic::tracks::Tracks;
 use crate::dynamic::{DynamicFilter, FilterInput, FirstPose, MovingMask, Region};
 use crate::features::FrameFeatures;
@@ -57,6 +58,8 @@ pub(super) struct Full {
     counters: Vec<[u32; 2]>,
     /// Whether the last frame was compared with the depth history.
     compared: bool,
+    /// Whether something moves in the last frame that no track covers.
+    moves_elsewhere: bool,
 }
 
 impl Full {
@@ -79,6 +82,7 @@ impl Full {
             static_m: Vec::new(),
             counters: Vec::new(),
             compared: false,
+            moves_elsewhere: false,
         }
     }
 
@@ -296,12 +300,14 @@ impl DynamicFilter for Full {
         self.sample_depth();
         self.history.compare(&config.full, first, &self.coarse_m);
         self.clear_static(config);
-        let (instances, unmapped, mut found) = (&mut self.segmenter.instances, &mut self.unmapped, false);
+        let (instances, unmapped, mut moving) = (&mut self.segmenter.instances, &mut self.unmapped, 0);
         self.history.for_each_moving_cell(&config.full, &self.static_m, |column, row| {
             instances.mark_coarse_cell(column, row);
             unmapped.mark_coarse_cell(column, row);
-            found = true;
+            moving += 1;
         });
+        let mut found = moving > 0;
+        self.moves_elsewhere = moving >= config.full.history_min_cells;
         self.update_evidence(&config.full, first, features);
         self.release_still_instances();
         let mut trusted: usize = features.features.iter().filter(|f| f.trust > 0.0).count();
@@ -354,6 +360,12 @@ impl DynamicFilter for Full {
 
     fn moving_mask(&self, _config: &DynamicConfig, _depth: &DepthImage) -> MovingMask {
         MovingMask { instances: self.unmapped.clone(), ..MovingMask::default() }
+    }
+
+    fn wants_detections(&self) -> bool {
+        // A track that was not segmented, or that the last search has missed, may have ended.
+        let is_uncertain = |track: &Track| !track.is_unknown && (track.missed_searches > 0 || track.depth_age > 0);
+        !self.compared || self.moves_elsewhere || self.tracks.list.iter().any(is_uncertain)
     }
 
     fn checks_visibility(&self) -> bool {
