@@ -92,6 +92,7 @@ def main():
     from rclpy.qos import DurabilityPolicy, QoSProfile
     from sensor_msgs.msg import PointCloud2
     from std_srvs.srv import Trigger
+    from visualization_msgs.msg import MarkerArray
 
     parameters = ["depth_units_per_metre:=5000", f"base_frame:={recording.FRAME}", f"map_file:={out / 'ros.map'}",
                   f"trajectory_file:={out / 'final.txt'}"] + options.p
@@ -102,7 +103,7 @@ def main():
 
     rclpy.init()
     node = rclpy.create_node("listener")
-    received = {name: [] for name in ("odom", "pose", "path", "grid", "cloud", "diagnostics")}
+    received = {name: [] for name in ("odom", "pose", "path", "grid", "cloud", "graph", "diagnostics")}
 
     def keep(name):
         return lambda message: received[name].append((time.monotonic(), message))
@@ -113,6 +114,7 @@ def main():
     node.create_subscription(Path, "/yfslam/path", keep("path"), 10)
     node.create_subscription(OccupancyGrid, "/map", keep("grid"), latched)
     node.create_subscription(PointCloud2, "/yfslam/landmarks", keep("cloud"), 10)
+    node.create_subscription(MarkerArray, "/yfslam/graph", keep("graph"), 10)
     node.create_subscription(DiagnosticArray, "/diagnostics", keep("diagnostics"), 10)
     save = node.create_client(Trigger, "/yfslam/save_map")
     began = time.monotonic()
@@ -171,6 +173,7 @@ def main():
         "largest step of odom, m": max(steps, default=None),
         "last path": len(received["path"][-1][1].poses) if received["path"] else 0,
         "last cloud": received["cloud"][-1][1].width if received["cloud"] else 0,
+        "last graph": [[m.ns, len(m.points)] for m in received["graph"][-1][1].markers] if received["graph"] else None,
         "last grid": [grids[-1].info.width, grids[-1].info.height, sum(v == 100 for v in grids[-1].data), sum(v == 0 for v in grids[-1].data)] if grids else None,
         "grid for a late listener": bool(late),
         "save_map": [answer.success, answer.message] if answer else "no answer",

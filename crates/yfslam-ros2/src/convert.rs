@@ -1,18 +1,23 @@
 //! From poses and maps to messages.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 use yfslam::Map;
 use yfslam_live::{Health, LiveState};
 
 use crate::inbox::Received;
 use crate::messages::{
-    Bytes, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Odometry, Path, PointCloud2, PointField, PoseStamped,
-    PoseWithCovariance, PoseWithCovarianceStamped, TransformStamped, TwistWithCovariance, rows,
+    Bytes, CompressedImage, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Marker, MarkerArray, Odometry, Path,
+    PointCloud2, PointField, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Rgba, Time, TransformStamped,
+    TwistWithCovariance, Xyz, rows,
 };
 use crate::odom_split::OdomStep;
 
 /// Variance of what is not known, m² and rad²: large, but such that filters can compute with it.
 const UNKNOWN: f64 = 1e3;
+
+/// `LINE_LIST` of `visualization_msgs/Marker`.
+const LINE_LIST: i32 = 5;
+const LINE_WIDTH_M: f64 = 0.01;
 
 /// `FLOAT32` of `sensor_msgs/PointField`.
 const FLOAT32: u8 = 7;
@@ -109,6 +114,48 @@ pub fn landmarks(header: Header, map: &Map, t_map_world: &Isometry3<f64>) -> Poi
         row_step: count.saturating_mul(16),
         data: Bytes(data),
         is_dense: true,
+    }
+}
+
+/// Returns the graph of the keyframes as lines: the spanning tree, and the loops.
+pub fn graph(header: &Header, map: &Map, t_map_world: &Isometry3<f64>) -> MarkerArray {
+    let place = |id| {
+        map.keyframe(id).map(|keyframe| t_map_world * Point3::from(keyframe.t_cam_world.inverse().translation.vector))
+    };
+    let (mut tree, mut loops) = (Vec::new(), Vec::new());
+    for (id, keyframe) in map.keyframes() {
+        let Some(from) = place(id) else { continue };
+        tree.extend(keyframe.parent.and_then(place).into_iter().flat_map(|to| [from, to]));
+        // Each loop is known to both of its ends.
+        let others = keyframe.loop_edges.iter().filter(|other| **other > id);
+        loops.extend(others.filter_map(|other| place(*other)).flat_map(|to| [from, to]));
+    }
+    let lines = |(id, (ns, points, color)): (usize, (&str, Vec<Point3<f64>>, Rgba))| Marker {
+        header: header.clone(),
+        ns: ns.into(),
+        id: id as i32,
+        kind: LINE_LIST,
+        action: 0,
+        pose: Isometry3::identity().into(),
+        scale: Xyz { x: LINE_WIDTH_M, y: 0.0, z: 0.0 },
+        color,
+        lifetime: Time::default(),
+        frame_locked: false,
+        points: points.iter().map(|point| point.coords.into()).collect(),
+        colors: Vec::new(),
+        texture_resource: String::new(),
+        texture: CompressedImage::default(),
+        uv_coordinates: Vec::new(),
+        text: String::new(),
+        mesh_resource: String::new(),
+        mesh_file_name: String::new(),
+        mesh_file_data: Bytes::default(),
+        mesh_use_embedded_materials: false,
+    };
+    let grey = Rgba { r: 0.6, g: 0.6, b: 0.6, a: 1.0 };
+    let green = Rgba { r: 0.1, g: 0.8, b: 0.2, a: 1.0 };
+    MarkerArray {
+        markers: [("tree", tree, grey), ("loops", loops, green)].into_iter().enumerate().map(lines).collect(),
     }
 }
 

@@ -26,8 +26,8 @@ use serde::de::DeserializeOwned;
 
 use crate::inbox::Inbox;
 use crate::messages::{
-    CameraInfo, Clock, CompressedImage, DiagnosticArray, Image, OccupancyGrid, Odometry, Path, PointCloud2,
-    PoseWithCovarianceStamped, TfMessage, TriggerRequest, TriggerResponse,
+    CameraInfo, Clock, CompressedImage, DiagnosticArray, Image, MarkerArray, OccupancyGrid, Odometry, Path,
+    PointCloud2, PoseWithCovarianceStamped, TfMessage, TriggerRequest, TriggerResponse,
 };
 use crate::parameters::{Parameters, Value, find};
 use crate::ros_args::Names;
@@ -61,6 +61,7 @@ pub struct Dds {
     path: Publisher<Path>,
     grid: Publisher<OccupancyGrid>,
     landmarks: Publisher<PointCloud2>,
+    graph: Publisher<MarkerArray>,
     diagnostics: Publisher<DiagnosticArray>,
     unsent: u64,
     answers: Arc<Mutex<BTreeMap<u64, Answer>>>,
@@ -104,6 +105,7 @@ pub fn start(names: &Names, domain: u16, parameters: &Parameters, inbox: Inbox) 
         path: publisher(&mut node, names, Topic::Path)?,
         grid: publisher(&mut node, names, Topic::Grid)?,
         landmarks: publisher(&mut node, names, Topic::Landmarks)?,
+        graph: publisher(&mut node, names, Topic::Graph)?,
         diagnostics: publisher(&mut node, names, Topic::Diagnostics)?,
         unsent: 0,
         node,
@@ -311,6 +313,7 @@ impl Transport for Dds {
             Outgoing::Path(message) => self.path.publish(message).is_ok(),
             Outgoing::Grid(message) => self.grid.publish(message).is_ok(),
             Outgoing::Landmarks(message) => self.landmarks.publish(message).is_ok(),
+            Outgoing::Graph(message) => self.graph.publish(message).is_ok(),
             Outgoing::Diagnostics(message) => self.diagnostics.publish(message).is_ok(),
         };
         if !sent {
@@ -323,6 +326,7 @@ impl Transport for Dds {
         let count = match topic {
             Topic::Path => self.path.get_subscription_count(&self.node),
             Topic::Landmarks => self.landmarks.get_subscription_count(&self.node),
+            Topic::Graph => self.graph.get_subscription_count(&self.node),
             _ => 1,
         };
         count > 0

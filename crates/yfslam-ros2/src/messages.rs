@@ -248,6 +248,47 @@ pub struct DiagnosticArray {
     pub status: Vec<DiagnosticStatus>,
 }
 
+/// `std_msgs/ColorRGBA`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rgba {
+    pub r: f32,
+    pub g: f32,
+    pub b: f32,
+    pub a: f32,
+}
+
+/// `visualization_msgs/Marker`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Marker {
+    pub header: Header,
+    pub ns: String,
+    pub id: i32,
+    /// 5 is a list of lines.
+    pub kind: i32,
+    pub action: i32,
+    pub pose: Pose,
+    pub scale: Xyz,
+    pub color: Rgba,
+    pub lifetime: Time,
+    pub frame_locked: bool,
+    pub points: Vec<Xyz>,
+    pub colors: Vec<Rgba>,
+    pub texture_resource: String,
+    pub texture: CompressedImage,
+    pub uv_coordinates: Vec<[f32; 2]>,
+    pub text: String,
+    pub mesh_resource: String,
+    pub mesh_file_name: String,
+    pub mesh_file_data: Bytes,
+    pub mesh_use_embedded_materials: bool,
+}
+
+/// `visualization_msgs/MarkerArray`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MarkerArray {
+    pub markers: Vec<Marker>,
+}
+
 /// `sensor_msgs/Image`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Image {

@@ -16,7 +16,7 @@ use yfslam_live::{CameraEvent, LiveSession, LiveSource, Step};
 
 use crate::convert::{self, NodeNotes};
 use crate::grid_worker::GridWorker;
-use crate::inbox::Outbox;
+use crate::inbox::{Outbox, Received};
 use crate::messages::{CameraInfo, Header, TfMessage};
 use crate::mount::Mount;
 use crate::odom_split::{OdomSplit, SpeedLimit};
@@ -59,6 +59,7 @@ pub struct Node<T> {
     clock_ns: Option<i64>,
     last_stamp_ns: i64,
     last_pose: Option<Isometry3<f64>>,
+    last_received: Received,
     grid: Option<GridWorker>,
     grid_note: Option<(f64, usize)>,
     grid_keyframes: usize,
@@ -109,6 +110,7 @@ impl<T: Transport> Node<T> {
             clock_ns: None,
             last_stamp_ns: 0,
             last_pose: None,
+            last_received: Received::default(),
             grid,
             grid_note: None,
             grid_keyframes: 0,
@@ -338,14 +340,40 @@ impl<T: Transport> Node<T> {
         }
     }
 
+    /// Returns why images come, but no pairs, since the last diagnostics.
+    fn what_is_missing(&self, received: &Received) -> Option<String> {
+        let last = &self.last_received;
+        if received.pairs != last.pairs {
+            return None;
+        }
+        match (received.color > last.color, received.depth > last.depth) {
+            (true, false) => {
+                Some(format!("colour images come, but no depth images on {}", self.parameters.text("depth_topic")))
+            }
+            (false, true) => {
+                Some(format!("depth images come, but no colour images on {}", self.parameters.text("color_topic")))
+            }
+            (true, true) => {
+                let tolerance = self.parameters.number("sync_tolerance");
+                Some(format!(
+                    "colour and depth images come, but their stamps differ by more than sync_tolerance, {tolerance} s"
+                ))
+            }
+            (false, false) => None,
+        }
+    }
+
     fn publish_what_is_due(&mut self, now: Instant) {
         if now >= self.due.diagnostics {
             self.due.diagnostics = now + DIAGNOSTICS;
             let health = self.session.as_ref().map(|session| session.health(now));
+            let received = self.outbox.received();
+            let missing = self.what_is_missing(&received);
+            self.last_received = received;
             let notes = NodeNotes {
                 node: self.name.clone(),
-                problem: self.problem.clone(),
-                received: self.outbox.received(),
+                problem: self.problem.clone().or(missing),
+                received,
                 grid: self.grid_note,
                 is_localising: self.is_localising,
             };

@@ -1,7 +1,7 @@
 //! What carries messages: DDS today. The node knows this trait only, so that others can follow and tests need no network.
 
 use crate::messages::{
-    CameraInfo, CompressedImage, DiagnosticArray, Image, OccupancyGrid, Odometry, Path, PointCloud2,
+    CameraInfo, CompressedImage, DiagnosticArray, Image, MarkerArray, OccupancyGrid, Odometry, Path, PointCloud2,
     PoseWithCovarianceStamped, TfMessage,
 };
 use crate::parameters::Value;
@@ -28,6 +28,7 @@ pub enum Topic {
     Path,
     Grid,
     Landmarks,
+    Graph,
     Diagnostics,
 }
 
@@ -41,6 +42,7 @@ pub enum Outgoing {
     Path(Path),
     Grid(OccupancyGrid),
     Landmarks(PointCloud2),
+    Graph(MarkerArray),
     Diagnostics(DiagnosticArray),
 }
 
@@ -116,6 +118,7 @@ impl Topic {
             Self::Path => "~/path",
             Self::Grid => "map",
             Self::Landmarks => "~/landmarks",
+            Self::Graph => "~/graph",
             Self::Diagnostics => "/diagnostics",
         }
     }
@@ -129,6 +132,7 @@ impl Topic {
             Self::Path => ("nav_msgs", "Path"),
             Self::Grid => ("nav_msgs", "OccupancyGrid"),
             Self::Landmarks => ("sensor_msgs", "PointCloud2"),
+            Self::Graph => ("visualization_msgs", "MarkerArray"),
             Self::Diagnostics => ("diagnostic_msgs", "DiagnosticArray"),
         }
     }

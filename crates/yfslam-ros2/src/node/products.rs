@@ -38,6 +38,10 @@ impl<T: Transport> Node<T> {
             let landmarks = convert::landmarks(self.map_header(), map, &t_map_world);
             self.transport.publish(Outgoing::Landmarks(landmarks));
         }
+        if self.transport.is_wanted(Topic::Graph) {
+            let graph = convert::graph(&self.map_header(), map, &t_map_world);
+            self.transport.publish(Outgoing::Graph(graph));
+        }
     }
 
     /// Publishes a grid that is ready, and begins the next one when it is time and the map has grown.
