@@ -46,7 +46,8 @@ pub fn occupancy_grid(
         Some((values.clone().min()?, values.max()?))
     };
     let ((left, right), (low, high)) = (range(0)?, range(1)?);
-    let (width, height) = ((right - left + 1) as usize, (high - low + 1) as usize);
+    let cells = |from: i32, to: i32| usize::try_from(i64::from(to) - i64::from(from) + 1).ok();
+    let (width, height) = (cells(left, right)?, cells(low, high)?);
     let size = width.checked_mul(height).filter(|size| *size <= MOST_CELLS)?;
     let mut data = vec![UNKNOWN; size];
     for ([x, y], state) in columns {
@@ -78,4 +79,58 @@ fn has_neighbours(volume: &Volume, known: &KnownVoxel, wanted: usize) -> bool {
         }
     }
     found >= wanted
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may")]
+
+    use yfslam::Slam;
+    use yfslam_synth::World;
+
+    use super::*;
+    use crate::mount::optical;
+
+    /// The grid of a level camera is that of the core; a camera that was turned about the vertical gives the same one, turned.
+    #[test]
+    fn the_grid_is_that_of_the_core_and_turns_with_the_map() {
+        let world =
+            World::new(&yfslam_synth::parse("synth:sitting_xyz?people=0&width=320&height=240&frames=10").unwrap())
+                .unwrap();
+        let config = yfslam::Config::default();
+        let builder = Slam::builder(world.config().camera.clone()).config(config.clone()).dense(config.dense);
+        let mut slam = builder.build().unwrap();
+        (0..world.len()).for_each(|index| drop(slam.track(&world.frame(index).frame).unwrap()));
+        let heights = [-0.3, 0.3];
+        let mut dense = slam.dense().unwrap();
+        let (volume, expected) = (dense.volume(), dense.ground_grid(heights.map(|v| v as f32)));
+        let level = Isometry3::identity();
+        let found = occupancy_grid(Header::new(5, "map"), &volume, &level, heights).unwrap();
+        assert_eq!((found.width as usize, found.height as usize), (expected.width, expected.height));
+        let bytes: Vec<u8> = expected
+            .cells
+            .iter()
+            .map(|cell| match cell {
+                yfslam::dense::GridCell::Unknown => UNKNOWN,
+                yfslam::dense::GridCell::Free => FREE,
+                yfslam::dense::GridCell::Occupied => OCCUPIED,
+            })
+            .collect();
+        assert!(found.data.0 == bytes && bytes.contains(&OCCUPIED) && bytes.contains(&FREE));
+        assert!((found.origin.position.x - expected.origin_m[0]).abs() < 1e-6);
+        let quarter = Isometry3::rotation(nalgebra::Vector3::z() * std::f64::consts::FRAC_PI_2);
+        let turned = occupancy_grid(Header::default(), &volume, &quarter, heights).unwrap();
+        assert_eq!((turned.width, turned.height), (found.height, found.width));
+        let count = |grid: &OccupancyGrid| grid.data.0.iter().filter(|&&cell| cell == OCCUPIED).count();
+        assert_eq!(count(&turned), count(&found));
+        assert!(
+            occupancy_grid(
+                Header::default(),
+                &volume,
+                &Isometry3::from_parts(Default::default(), optical()),
+                [90.0, 91.0]
+            )
+            .is_none()
+        );
+    }
 }

@@ -10,6 +10,9 @@ use super::Node;
 use crate::messages::PoseWithCovarianceStamped;
 use crate::transport::{Command, Request, Transport};
 
+/// A pose that is farther from the origin is a mistake, m.
+const FARTHEST_M: f64 = 1e6;
+
 impl<T: Transport> Node<T> {
     pub(super) fn answer(&mut self, request: Request) {
         let answer = match request.command {
@@ -96,7 +99,8 @@ impl<T: Transport> Node<T> {
                 "initialpose is left out: the loaded map has its frame, and the camera is recognised in it without help"
             );
         }
-        let (Some(wanted), Some(pose)) = (message.pose.pose.to_isometry(), self.last_pose) else {
+        let wanted = message.pose.pose.to_isometry().filter(|pose| pose.translation.vector.norm() <= FARTHEST_M);
+        let (Some(wanted), Some(pose)) = (wanted, self.last_pose) else {
             return tracing::warn!("initialpose is left out: the pose is not known, or the message is no pose");
         };
         let t_new_old = wanted * pose.inverse();

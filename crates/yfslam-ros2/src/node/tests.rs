@@ -196,6 +196,33 @@ fn each_pair_gives_odometry_a_pose_and_transforms_that_agree_with_the_truth() {
 }
 
 #[test]
+fn in_lockstep_the_node_sends_the_same_bits_twice_and_those_of_the_library() {
+    let drive = || {
+        let mut setup = setup(&[("base_frame", "")]);
+        setup.info();
+        (0..20).for_each(|index| setup.pair(index, 0));
+        setup
+    };
+    let (first, second) = (drive(), drive());
+    assert_eq!(first.poses().len(), 20);
+    assert_eq!(first.poses(), second.poses());
+    let camera = first.node.camera.clone().unwrap().0;
+    let mount = first.node.mount.clone().unwrap();
+    let mut slam = first.node.factory.build(&camera, None).unwrap();
+    let poses = (0..20).map(|index| {
+        let mut frame = shot(index).frame.clone();
+        frame.depth_timestamp_ns = Some(frame.timestamp_ns);
+        // The images alone: the boxes of the world do not travel with messages.
+        frame.detections = None;
+        let t_world_cam = slam.track(&frame).unwrap().t_world_cam.unwrap();
+        let pose = Isometry3::identity() * mount.t_map_world * t_world_cam * mount.t_base_cam.inverse();
+        // As the message stores it.
+        crate::messages::Pose::from(pose).to_isometry().unwrap()
+    });
+    assert_eq!(poses.collect::<Vec<_>>(), first.poses());
+}
+
+#[test]
 fn the_mount_comes_from_tf_static_and_is_published_only_if_it_is_not_there() {
     let mount = Isometry3::from_parts(Vector3::new(0.3, 0.0, 0.5).into(), optical());
     let mut given = setup(&[]);
