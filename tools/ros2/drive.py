@@ -20,7 +20,10 @@ import time
 import recording
 
 
-def publish(folder, limit, rate, reliable, times, ready, go):
+COMPRESSED = ("/compressed", "/compressedDepth")
+
+
+def publish(folder, limit, rate, reliable, packed, times, ready, go):
     import rclpy
     from rclpy.qos import QoSProfile, ReliabilityPolicy
 
@@ -28,10 +31,12 @@ def publish(folder, limit, rate, reliable, times, ready, go):
     node = rclpy.create_node("camera")
     kind = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
     qos = QoSProfile(depth=5, reliability=kind)
-    color = node.create_publisher(recording.Image, recording.COLOR, qos)
-    depth = node.create_publisher(recording.Image, recording.DEPTH, qos)
+    of, suffixes = (recording.CompressedImage, COMPRESSED) if packed else (recording.Image, ("", ""))
+    color = node.create_publisher(of, recording.COLOR + suffixes[0], qos)
+    depth = node.create_publisher(of, recording.DEPTH + suffixes[1], qos)
     info = node.create_publisher(recording.CameraInfo, recording.INFO, qos)
-    frames, calibration = recording.load(folder, limit), recording.camera_info(folder)
+    frames = (recording.load_files if packed else recording.load)(folder, limit)
+    calibration = recording.camera_info(folder)
     ready.set()
     go.wait()
     # The calibration comes with every image; before the first one the node waits for it.
@@ -70,6 +75,7 @@ def main():
     parser.add_argument("--rate", type=float, default=1.0)
     parser.add_argument("--domain", default="42")
     parser.add_argument("--reliable", action="store_true")
+    parser.add_argument("--compressed", action="store_true", help="send JPEG and compressedDepth")
     parser.add_argument("-p", action="append", default=[], help="parameter of the node, NAME:=VALUE")
     options = parser.parse_args()
     os.environ["ROS_DOMAIN_ID"] = options.domain
@@ -79,7 +85,7 @@ def main():
     manager = multiprocessing.Manager()
     times, ready, go = manager.dict(), manager.Event(), manager.Event()
     camera = multiprocessing.get_context("spawn").Process(
-        target=publish, args=(options.recording, options.frames, options.rate, options.reliable, times, ready, go)
+        target=publish, args=(options.recording, options.frames, options.rate, options.reliable, options.compressed, times, ready, go)
     )
     camera.start()
 
@@ -96,6 +102,8 @@ def main():
 
     parameters = ["depth_units_per_metre:=5000", f"base_frame:={recording.FRAME}", f"map_file:={out / 'ros.map'}",
                   f"trajectory_file:={out / 'final.txt'}"] + options.p
+    if options.compressed:
+        parameters += [f"color_topic:={recording.COLOR}{COMPRESSED[0]}", f"depth_topic:={recording.DEPTH}{COMPRESSED[1]}"]
     command = [options.node, "--ros-args"] + [word for p in parameters for word in ("-p", p)]
     ready.wait()
     log = open(out / "node.log", "w")

@@ -5,7 +5,7 @@ import pathlib
 
 import numpy
 from PIL import Image as Picture
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 FRAME = "camera_color_optical_frame"
 COLOR = "/camera/camera/color/image_raw"
@@ -32,6 +32,22 @@ def image(header, encoding, pixels):
     message.step = pixels.strides[0]
     message.data = array.array("B", pixels.tobytes())
     return message
+
+
+def load_files(folder, limit):
+    """Returns (stamp, colour file, depth file) as messages of `compressed` and `compressedDepth` transports."""
+    from std_msgs.msg import Header
+
+    loaded = []
+    for stamp, color, depth_stamp, depth in pairs(folder, limit):
+        files = [(pathlib.Path(folder) / name).read_bytes() for name in (color, depth)]
+        # The head of compressedDepth, which only depth in metres needs.
+        messages = [CompressedImage(header=Header(frame_id=FRAME), format=form, data=array.array("B", data)) for form, data in
+                    (("rgb8; jpeg compressed bgr8", files[0]), ("16UC1; compressedDepth png", bytes(12) + files[1]))]
+        for message, ns in zip(messages, (stamp, depth_stamp)):
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(ns, 10**9)
+        loaded.append((stamp, *messages))
+    return loaded
 
 
 def load(folder, limit):
