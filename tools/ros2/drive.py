@@ -111,7 +111,7 @@ def main():
 
     rclpy.init()
     node = rclpy.create_node("listener")
-    received = {name: [] for name in ("odom", "pose", "path", "grid", "cloud", "graph", "diagnostics")}
+    received = {name: [] for name in ("odom", "pose", "path", "grid", "cloud", "graph", "people", "diagnostics")}
 
     def keep(name):
         return lambda message: received[name].append((time.monotonic(), message))
@@ -123,6 +123,7 @@ def main():
     node.create_subscription(OccupancyGrid, "/map", keep("grid"), latched)
     node.create_subscription(PointCloud2, "/yfslam/landmarks", keep("cloud"), 10)
     node.create_subscription(MarkerArray, "/yfslam/graph", keep("graph"), 10)
+    node.create_subscription(MarkerArray, "/yfslam/people", keep("people"), 10)
     node.create_subscription(DiagnosticArray, "/diagnostics", keep("diagnostics"), 10)
     save = node.create_client(Trigger, "/yfslam/save_map")
     began = time.monotonic()
@@ -182,6 +183,7 @@ def main():
         "last path": len(received["path"][-1][1].poses) if received["path"] else 0,
         "last cloud": received["cloud"][-1][1].width if received["cloud"] else 0,
         "last graph": [[m.ns, len(m.points)] for m in received["graph"][-1][1].markers] if received["graph"] else None,
+        "boxes of people": sum(len(m.markers) - 1 for _, m in received["people"]),
         "last grid": [grids[-1].info.width, grids[-1].info.height, sum(v == 100 for v in grids[-1].data), sum(v == 0 for v in grids[-1].data)] if grids else None,
         "grid for a late listener": bool(late),
         "save_map": [answer.success, answer.message] if answer else "no answer",

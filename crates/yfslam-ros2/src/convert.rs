@@ -1,7 +1,7 @@
 //! From poses and maps to messages.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
-use yfslam::Map;
+use yfslam::{Camera, Map, Region};
 use yfslam_live::{Health, LiveState};
 
 use crate::inbox::Received;
@@ -15,7 +15,9 @@ use crate::odom_split::OdomStep;
 /// Variance of what is not known, m² and rad²: large, but such that filters can compute with it.
 const UNKNOWN: f64 = 1e3;
 
-/// `LINE_LIST` of `visualization_msgs/Marker`.
+/// Of `visualization_msgs/Marker`.
+const CUBE: i32 = 1;
+const DELETE_ALL: i32 = 3;
 const LINE_LIST: i32 = 5;
 const LINE_WIDTH_M: f64 = 0.01;
 
@@ -131,17 +133,56 @@ pub fn graph(header: &Header, map: &Map, t_map_world: &Isometry3<f64>) -> Marker
         loops.extend(others.filter_map(|other| place(*other)).flat_map(|to| [from, to]));
     }
     let lines = |(id, (ns, points, color)): (usize, (&str, Vec<Point3<f64>>, Rgba))| Marker {
-        header: header.clone(),
-        ns: ns.into(),
-        id: id as i32,
         kind: LINE_LIST,
-        action: 0,
-        pose: Isometry3::identity().into(),
         scale: Xyz { x: LINE_WIDTH_M, y: 0.0, z: 0.0 },
         color,
+        points: points.iter().map(|point| point.coords.into()).collect(),
+        ..marker(header, ns, id)
+    };
+    let grey = Rgba { r: 0.6, g: 0.6, b: 0.6, a: 1.0 };
+    let green = Rgba { r: 0.1, g: 0.8, b: 0.2, a: 1.0 };
+    MarkerArray {
+        markers: [("tree", tree, grey), ("loops", loops, green)].into_iter().enumerate().map(lines).collect(),
+    }
+}
+
+/// Returns what moves as boxes along the axes of the camera, where its depth is known. The first marker removes those of the last image.
+pub fn people(header: &Header, regions: &[Region], camera: &Camera, t_map_cam: &Isometry3<f64>) -> MarkerArray {
+    let mut markers = vec![Marker { action: DELETE_ALL, ..marker(header, "people", 0) }];
+    for Region { bbox, score, depth_m, .. } in regions {
+        let Some([near, far]) =
+            depth_m.map(|depth| depth.map(f64::from)).filter(|[near, far]| *near > 0.0 && far > near)
+        else {
+            continue;
+        };
+        let middle = 0.5 * (near + far);
+        let x = [bbox.x_min, bbox.x_max].map(|x| (f64::from(x) - camera.cx) / camera.fx * middle);
+        let y = [bbox.y_min, bbox.y_max].map(|y| (f64::from(y) - camera.cy) / camera.fy * middle);
+        let center = Isometry3::translation(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]), middle);
+        markers.push(Marker {
+            kind: CUBE,
+            pose: (t_map_cam * center).into(),
+            scale: Xyz { x: (x[1] - x[0]).abs(), y: (y[1] - y[0]).abs(), z: far - near },
+            color: Rgba { r: 1.0, g: 0.2, b: 0.1, a: 0.2 + 0.4 * score.clamp(0.0, 1.0) },
+            ..marker(header, "people", markers.len())
+        });
+    }
+    MarkerArray { markers }
+}
+
+fn marker(header: &Header, ns: &str, id: usize) -> Marker {
+    Marker {
+        header: header.clone(),
+        ns: ns.into(),
+        id: i32::try_from(id).unwrap_or(i32::MAX),
+        kind: 0,
+        action: 0,
+        pose: Isometry3::identity().into(),
+        scale: Xyz::default(),
+        color: Rgba::default(),
         lifetime: Time::default(),
         frame_locked: false,
-        points: points.iter().map(|point| point.coords.into()).collect(),
+        points: Vec::new(),
         colors: Vec::new(),
         texture_resource: String::new(),
         texture: CompressedImage::default(),
@@ -151,11 +192,6 @@ pub fn graph(header: &Header, map: &Map, t_map_world: &Isometry3<f64>) -> Marker
         mesh_file_name: String::new(),
         mesh_file_data: Bytes::default(),
         mesh_use_embedded_materials: false,
-    };
-    let grey = Rgba { r: 0.6, g: 0.6, b: 0.6, a: 1.0 };
-    let green = Rgba { r: 0.1, g: 0.8, b: 0.2, a: 1.0 };
-    MarkerArray {
-        markers: [("tree", tree, grey), ("loops", loops, green)].into_iter().enumerate().map(lines).collect(),
     }
 }
 
@@ -266,6 +302,21 @@ mod tests {
         }
         let expected = jacobian * Matrix6::from_diagonal(&sigma.component_mul(&sigma)) * jacobian.transpose();
         assert!((found - expected).norm() < 1e-6 * expected.norm(), "{found} {expected}");
+    }
+
+    #[test]
+    fn what_moves_is_a_box_where_its_depth_is_and_nothing_where_it_is_not_known() {
+        let camera = Camera::pinhole(640, 480, 500.0, 500.0, 320.0, 240.0);
+        let bbox = yfslam::BoundingBox { x_min: 320.0, y_min: 140.0, x_max: 420.0, y_max: 340.0 };
+        let region = |depth_m| Region { bbox, score: 0.9, misses: 0, depth_m };
+        let regions = [region(Some([1.8, 2.2])), region(None)];
+        let up = Isometry3::translation(0.0, 0.0, 5.0);
+        let markers = people(&Header::default(), &regions, &camera, &up).markers;
+        assert_eq!((markers.len(), markers[0].action, markers[1].kind), (2, DELETE_ALL, CUBE));
+        let (place, size) = (markers[1].pose.position, markers[1].scale);
+        let near =
+            |found: Xyz, x: f64, y: f64, z: f64| (found.x - x).abs() + (found.y - y).abs() + (found.z - z).abs() < 1e-6;
+        assert!(near(place, 0.2, 0.0, 7.0) && near(size, 0.4, 0.8, 0.4), "{place:?} {size:?}");
     }
 
     #[test]

@@ -62,6 +62,7 @@ pub struct Dds {
     grid: Publisher<OccupancyGrid>,
     landmarks: Publisher<PointCloud2>,
     graph: Publisher<MarkerArray>,
+    people: Publisher<MarkerArray>,
     diagnostics: Publisher<DiagnosticArray>,
     unsent: u64,
     answers: Arc<Mutex<BTreeMap<u64, Answer>>>,
@@ -106,6 +107,7 @@ pub fn start(names: &Names, domain: u16, parameters: &Parameters, inbox: Inbox) 
         grid: publisher(&mut node, names, Topic::Grid)?,
         landmarks: publisher(&mut node, names, Topic::Landmarks)?,
         graph: publisher(&mut node, names, Topic::Graph)?,
+        people: publisher(&mut node, names, Topic::People)?,
         diagnostics: publisher(&mut node, names, Topic::Diagnostics)?,
         unsent: 0,
         node,
@@ -314,6 +316,7 @@ impl Transport for Dds {
             Outgoing::Grid(message) => self.grid.publish(message).is_ok(),
             Outgoing::Landmarks(message) => self.landmarks.publish(message).is_ok(),
             Outgoing::Graph(message) => self.graph.publish(message).is_ok(),
+            Outgoing::People(message) => self.people.publish(message).is_ok(),
             Outgoing::Diagnostics(message) => self.diagnostics.publish(message).is_ok(),
         };
         if !sent {
@@ -327,6 +330,7 @@ impl Transport for Dds {
             Topic::Path => self.path.get_subscription_count(&self.node),
             Topic::Landmarks => self.landmarks.get_subscription_count(&self.node),
             Topic::Graph => self.graph.get_subscription_count(&self.node),
+            Topic::People => self.people.get_subscription_count(&self.node),
             _ => 1,
         };
         count > 0

@@ -56,8 +56,8 @@ Example:
   yfslam-ros2 --ros-args -p base_frame:=base_link -p map_file:=lab.map
 
 Subscribes (parameters color_topic, depth_topic, camera_info_topic), /tf, /tf_static, /initialpose, and /clock with use_sim_time
-Publishes  odom, ~/pose, /tf, map (occupancy grid), ~/path, ~/landmarks, /diagnostics
-Services   ~/save_map, ~/reset, ~/pause, ~/resume, ~/localise, ~/extend (std_srvs/Trigger), and those of parameters
+Publishes  odom, ~/pose, /tf, map (occupancy grid), ~/path, ~/landmarks, ~/graph, ~/people, /diagnostics
+Services   ~/save_map, ~/load_map, ~/reset, ~/pause, ~/resume, ~/localise, ~/extend (std_srvs/Trigger), and those of parameters
 
 SIGINT (Ctrl-C) and SIGTERM end the node; map and trajectory are saved if save_on_exit and trajectory_file say so. A second signal ends
 it at once. RUST_LOG=warn, info or debug sets what is logged.

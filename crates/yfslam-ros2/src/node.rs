@@ -23,7 +23,7 @@ use crate::odom_split::{OdomSplit, SpeedLimit};
 use crate::parameters::Parameters;
 use crate::slam_factory::{SlamFactory, load_map};
 use crate::tf_tree::{GivenOdom, StaticTf};
-use crate::transport::{Incoming, Outgoing, Transport};
+use crate::transport::{Incoming, Outgoing, Topic, Transport};
 
 /// Longest time that a request waits.
 const TICK: Duration = Duration::from_millis(20);
@@ -51,6 +51,8 @@ pub struct Node<T> {
     is_odom_given: bool,
     own_stamps: std::collections::VecDeque<i64>,
     split: OdomSplit,
+    /// Whether the map came from a file, whose frame is fixed.
+    is_map_loaded: bool,
     /// Where `/initialpose` has moved the map frame.
     t_map_moved: Isometry3<f64>,
     resets: usize,
@@ -92,6 +94,7 @@ impl<T: Transport> Node<T> {
             factory: SlamFactory::new(&parameters)?,
             is_odom_given: parameters.text("odom") == "given",
             is_localising: parameters.flag("localise_only"),
+            is_map_loaded: !parameters.text("load_map").is_empty(),
             transport,
             outbox,
             parameters,
@@ -327,6 +330,13 @@ impl<T: Transport> Node<T> {
         };
         if !transforms.is_empty() {
             self.transport.publish(Outgoing::Tf(TfMessage { transforms }));
+        }
+        if let (Some(session), Some((camera, _))) = (&self.session, &self.camera)
+            && self.transport.is_wanted(Topic::People)
+        {
+            let regions = session.slam().moving_regions();
+            let people = convert::people(&Header::new(stamp_ns, &map), regions, camera, &t_map_cam);
+            self.transport.publish(Outgoing::People(people));
         }
     }
 

@@ -124,10 +124,16 @@ pub const PARAMETERS: &[Parameter] = &[
         "Method for dynamic scenes.",
     ),
     p("detect_every", Kind::Integer(1, 1, 1000), false, "The detector runs on every n-th frame."),
+    p(
+        "detect_async",
+        Kind::Bool(false),
+        false,
+        "Tracking does not wait for the detector, and uses boxes when they are ready; for weak boards.",
+    ),
     p("threaded", Kind::Bool(true), false, "Mapping runs on its own thread."),
     p("load_map", Kind::Text(""), false, "Map of an earlier session."),
     p("localise_only", Kind::Bool(false), false, "The loaded map stays as it is."),
-    p("map_file", Kind::Text("yfslam.map"), true, "File of the service save_map."),
+    p("map_file", Kind::Text("yfslam.map"), true, "File of the services save_map and load_map."),
     p("save_on_exit", Kind::Bool(false), true, "The map is saved when the node ends."),
     p(
         "trajectory_file",

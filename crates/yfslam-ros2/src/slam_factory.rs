@@ -36,6 +36,7 @@ impl SlamFactory {
             config.dynamic.method = method(parameters.text("method"));
         }
         config.dynamic.detect_every = usize::try_from(parameters.integer("detect_every")).unwrap_or(1);
+        config.dynamic.detect_async |= parameters.flag("detect_async");
         config.validate()?;
         let execution = if parameters.flag("threaded") { Execution::Threaded } else { Execution::Inline };
         Ok(Self { config, execution, has_grid: parameters.flag("grid") })

@@ -29,6 +29,7 @@ pub enum Topic {
     Grid,
     Landmarks,
     Graph,
+    People,
     Diagnostics,
 }
 
@@ -43,6 +44,7 @@ pub enum Outgoing {
     Grid(OccupancyGrid),
     Landmarks(PointCloud2),
     Graph(MarkerArray),
+    People(MarkerArray),
     Diagnostics(DiagnosticArray),
 }
 
@@ -89,10 +91,13 @@ pub enum Command {
     Localise,
     /// The present map is extended again.
     Extend,
+    /// The map of the parameter map_file takes the place of the present one.
+    LoadMap,
 }
 
 impl Command {
-    pub const ALL: [Self; 6] = [Self::SaveMap, Self::Reset, Self::Pause, Self::Resume, Self::Localise, Self::Extend];
+    pub const ALL: [Self; 7] =
+        [Self::SaveMap, Self::LoadMap, Self::Reset, Self::Pause, Self::Resume, Self::Localise, Self::Extend];
 
     /// Returns the name of its service, `~/NAME`.
     pub fn name(self) -> &'static str {
@@ -103,6 +108,7 @@ impl Command {
             Self::Resume => "resume",
             Self::Localise => "localise",
             Self::Extend => "extend",
+            Self::LoadMap => "load_map",
         }
     }
 }
@@ -119,6 +125,7 @@ impl Topic {
             Self::Grid => "map",
             Self::Landmarks => "~/landmarks",
             Self::Graph => "~/graph",
+            Self::People => "~/people",
             Self::Diagnostics => "/diagnostics",
         }
     }
@@ -132,7 +139,7 @@ impl Topic {
             Self::Path => ("nav_msgs", "Path"),
             Self::Grid => ("nav_msgs", "OccupancyGrid"),
             Self::Landmarks => ("sensor_msgs", "PointCloud2"),
-            Self::Graph => ("visualization_msgs", "MarkerArray"),
+            Self::Graph | Self::People => ("visualization_msgs", "MarkerArray"),
             Self::Diagnostics => ("diagnostic_msgs", "DiagnosticArray"),
         }
     }

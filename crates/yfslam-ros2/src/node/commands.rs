@@ -8,6 +8,7 @@ use yfslam_io::{StampedPose, write_atomically, write_trajectory};
 
 use super::Node;
 use crate::messages::PoseWithCovarianceStamped;
+use crate::slam_factory::load_map;
 use crate::transport::{Command, Request, Transport};
 
 /// A pose that is farther from the origin is a mistake, m.
@@ -21,6 +22,7 @@ impl<T: Transport> Node<T> {
             Command::Pause | Command::Resume => self.pause(request.command == Command::Pause),
             Command::Localise => self.use_map(MapUse::Localise),
             Command::Extend => self.use_map(MapUse::Extend),
+            Command::LoadMap => self.load_file(),
         };
         let answer = answer.map_err(|error| format!("{error:#}"));
         match &answer {
@@ -49,6 +51,7 @@ impl<T: Transport> Node<T> {
         let session = self.session.as_mut().context("there is nothing to reset: the node has not begun")?;
         session.replace(slam);
         self.is_localising = false;
+        self.is_map_loaded = false;
         self.begin_map_anew();
         Ok("a new map begins with the next image".into())
     }
@@ -78,6 +81,20 @@ impl<T: Transport> Node<T> {
             .into())
     }
 
+    /// Takes the map of the file in place of the present one, which is lost unless it was saved.
+    fn load_file(&mut self) -> Result<String> {
+        let path = self.parameters.text("map_file").to_owned();
+        let (camera, _) = self.camera.as_ref().context("the camera is not known yet: no camera_info has come")?;
+        let session = self.session.as_mut().context("the node has not begun")?;
+        let map_use = if self.is_localising { MapUse::Localise } else { MapUse::Extend };
+        let slam = self.factory.build(camera, Some((load_map(&path)?, map_use)))?;
+        session.replace(slam);
+        self.is_map_loaded = true;
+        self.begin_map_anew();
+        self.grid_keyframes = usize::MAX;
+        Ok(format!("{path} is the map from now on; the camera is lost until it is recognised in it"))
+    }
+
     fn begin_map_anew(&mut self) {
         self.split.lose();
         self.resets = 0;
@@ -94,7 +111,7 @@ impl<T: Transport> Node<T> {
         if !frame.is_empty() && frame != map_frame {
             return tracing::warn!("initialpose is in frame {frame}; give it in {map_frame}");
         }
-        if !self.parameters.text("load_map").is_empty() {
+        if self.is_map_loaded {
             return tracing::warn!(
                 "initialpose is left out: the loaded map has its frame, and the camera is recognised in it without help"
             );

@@ -337,6 +337,10 @@ fn requests_are_answered_and_a_map_outlives_the_node() {
     setup.ask(Command::Reset).unwrap();
     setup.pair(20, 2_000_000_000);
     assert!(setup.poses().last().unwrap().translation.vector.norm() < 1e-9, "a new map begins");
+    setup.ask(Command::LoadMap).unwrap();
+    (21..30).for_each(|index| setup.pair(index, 2_000_000_000));
+    let error = (setup.poses().last().unwrap().translation.vector - truth(29).translation.vector).norm();
+    assert!(error < 0.02, "{error} m from where the map has it that was loaded");
 
     // Tomorrow: the same file, the same frame.
     let mut tomorrow = self::setup(&[("load_map", &file), ("localise_only", "true")]);
