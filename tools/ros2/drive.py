@@ -27,7 +27,7 @@ def publish(folder, limit, rate, reliable, packed, times, ready, go):
     import rclpy
     from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-    rclpy.init()
+    rclpy.init(args=[])
     node = rclpy.create_node("camera")
     kind = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
     qos = QoSProfile(depth=5, reliability=kind)
@@ -109,7 +109,7 @@ def main():
     log = open(out / "node.log", "w")
     node_process = subprocess.Popen(command, stderr=log)
 
-    rclpy.init()
+    rclpy.init(args=[])
     node = rclpy.create_node("listener")
     received = {name: [] for name in ("odom", "pose", "path", "grid", "cloud", "graph", "people", "diagnostics")}
 

@@ -21,7 +21,7 @@ def camera(options):
     import rclpy
     from rclpy.qos import qos_profile_sensor_data
 
-    rclpy.init()
+    rclpy.init(args=[])
     node = rclpy.create_node("camera")
     color = node.create_publisher(recording.Image, recording.COLOR, qos_profile_sensor_data)
     depth = node.create_publisher(recording.Image, recording.DEPTH, qos_profile_sensor_data)
