@@ -308,8 +308,8 @@ fn serve_all(
 impl Transport for Dds {
     fn publish(&mut self, message: Outgoing) {
         let sent = match message {
-            Outgoing::Odometry(message) => self.odometry.publish(message).is_ok(),
-            Outgoing::Pose(message) => self.pose.publish(message).is_ok(),
+            Outgoing::Odometry(message) => self.odometry.publish(*message).is_ok(),
+            Outgoing::Pose(message) => self.pose.publish(*message).is_ok(),
             Outgoing::Tf(message) => self.tf.publish(message).is_ok(),
             Outgoing::TfStatic(message) => self.tf_static.publish(message).is_ok(),
             Outgoing::Path(message) => self.path.publish(message).is_ok(),

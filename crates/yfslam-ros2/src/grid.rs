@@ -100,7 +100,9 @@ mod tests {
         let config = yfslam::Config::default();
         let builder = Slam::builder(world.config().camera.clone()).config(config.clone()).dense(config.dense);
         let mut slam = builder.build().unwrap();
-        (0..world.len()).for_each(|index| drop(slam.track(&world.frame(index).frame).unwrap()));
+        for index in 0..world.len() {
+            slam.track(&world.frame(index).frame).unwrap();
+        }
         let heights = [-0.3, 0.3];
         let mut dense = slam.dense().unwrap();
         let (volume, expected) = (dense.volume(), dense.ground_grid(heights.map(|v| v as f32)));

@@ -96,7 +96,7 @@ mod tests {
         // 1 m above the base, 30 degrees down: an optical frame turned about y of the base.
         let t_base_cam = Isometry3::from_parts(
             Translation3::new(0.0, 0.0, 1.0),
-            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.5236) * optical(),
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::FRAC_PI_6) * optical(),
         );
         let mut tf = StaticTf::default();
         tf.add(&TfMessage {

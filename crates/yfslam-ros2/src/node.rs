@@ -307,8 +307,12 @@ impl<T: Transport> Node<T> {
         let visual = if self.is_odom_given { format!("{odom}_visual") } else { odom.clone() };
         let drift = self.parameters.number("odom_drift");
         let odometry = convert::odometry(Header::new(stamp_ns, &visual), &base, &step, &in_odom, drift);
-        self.transport.publish(Outgoing::Odometry(odometry));
-        self.transport.publish(Outgoing::Pose(convert::pose(Header::new(stamp_ns, &map), t_map_base, &in_map)));
+        self.transport.publish(Outgoing::Odometry(Box::new(odometry)));
+        self.transport.publish(Outgoing::Pose(Box::new(convert::pose(
+            Header::new(stamp_ns, &map),
+            t_map_base,
+            &in_map,
+        ))));
         let ahead_ns = (self.parameters.number("transform_tolerance") * 1e9) as i64;
         let ahead = Header::new(stamp_ns.saturating_add(ahead_ns), &map);
         let transforms = if self.parameters.text("odom") == "none" {

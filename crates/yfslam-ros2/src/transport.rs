@@ -36,8 +36,8 @@ pub enum Topic {
 /// A message that is sent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outgoing {
-    Odometry(Odometry),
-    Pose(PoseWithCovarianceStamped),
+    Odometry(Box<Odometry>),
+    Pose(Box<PoseWithCovarianceStamped>),
     Tf(TfMessage),
     TfStatic(TfMessage),
     Path(Path),
