@@ -116,3 +116,32 @@ fn options_that_cannot_be_are_refused() {
     fails(folder.path(), &["live", "room", "--method", "none,boxes"], &["--threaded"]);
     fails(folder.path(), &["live", "-", "--start", "3"], &["--start"]);
 }
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_live_run_that_waits_and_what_was_tracked_is_saved() {
+    use rustix::process::{Pid, Signal, kill_process};
+
+    let folder = tempfile::tempdir().unwrap();
+    let room = folder.path().join("room");
+    record(&room);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_yfslam"));
+    command.args(["live", "-", "--method", "none", "--out", "out", "--save-map", "room.map", "--checkpoint", "0.01"]);
+    command.current_dir(folder.path()).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = command.spawn().unwrap();
+    // The sender stays, and sends no more: the program waits for the next frame.
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(&piped(&room)).unwrap();
+    input.flush().unwrap();
+    let started = std::time::Instant::now();
+    while !folder.path().join("room.map").is_file() {
+        assert!(started.elapsed().as_secs() < 60, "nothing was tracked");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    drop(input);
+    let report = report(&folder.path().join("out"));
+    assert_eq!(report["interrupted"], true);
+    assert!(report["frames"]["tracked"].as_u64().unwrap() > 0, "{report}");
+}

@@ -58,6 +58,11 @@ impl Frames {
         Ok(Self { player, faults: FaultInjector::new(Vec::new(), 0), depth_source })
     }
 
+    /// Returns whether frames come when it is time for them.
+    pub fn is_live(&self) -> bool {
+        matches!(self.player, Player::Live(_))
+    }
+
     /// Returns the next frame, or why it cannot be used; `None` at the end. Adds the durations of reading to `stages`.
     pub fn next(&mut self, stages: &mut Stages) -> Option<Result<Frame, Skip>> {
         loop {
