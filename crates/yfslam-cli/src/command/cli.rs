@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    bench, calibrate, camera, completions, config, convert, demo, detect, eval, evo, info, map, run, synth,
+    bench, calibrate, camera, completions, config, convert, demo, detect, eval, evo, info, live, map, run, synth,
 };
 use crate::input::detector::describe_embedded;
 use crate::ui::verbosity::Verbosity;
@@ -14,6 +14,7 @@ const HELP: &str = "\
 Examples:
   yfslam demo                                  compares methods, without data
   yfslam run rgbd_bonn_crowd --camera bonn     tracks a sequence
+  yfslam live rgbd_bonn_crowd --camera bonn    the same as it would be on a robot
   yfslam detect photo.jpg --images             detects people
   yfslam eval groundtruth.txt yfslam-out/rgbd_bonn_crowd/trajectory.txt";
 
@@ -36,6 +37,7 @@ fn long_version() -> &'static str {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Run(Box<run::RunArgs>),
+    Live(Box<live::LiveArgs>),
     Map(map::DenseMapArgs),
     Eval(eval::EvalArgs),
     Ape(evo::ApeArgs),

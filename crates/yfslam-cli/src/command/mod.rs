@@ -12,6 +12,7 @@ pub mod detect;
 pub mod eval;
 pub mod evo;
 pub mod info;
+pub mod live;
 pub mod map;
 pub mod run;
 pub mod synth;
@@ -30,6 +31,7 @@ pub fn run(cli: &Cli) -> Result<()> {
     let terminal = Terminal::new(cli.verbosity);
     match &cli.command {
         Command::Run(args) => run::run(args, terminal),
+        Command::Live(args) => live::run(args, terminal),
         Command::Map(args) => map::run(args, terminal),
         Command::Eval(args) => eval::run(args, terminal),
         Command::Convert(args) => convert::run(args, terminal),

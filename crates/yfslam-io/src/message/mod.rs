@@ -102,9 +102,32 @@ pub fn decode_color_message(
 ) -> Result<(), DecodeError> {
     let mut from = Reader::new(wire, bytes).map_err(damaged)?;
     if kind != MessageType::CompressedImage {
-        return color::decode(&Image::read(&mut from).map_err(damaged)?, expected, into);
+        return decode_color_image(&Image::read(&mut from).map_err(damaged)?, expected, into);
     }
-    let image = CompressedImage::read(&mut from).map_err(damaged)?;
+    decode_compressed_color(&CompressedImage::read(&mut from).map_err(damaged)?, expected, into)
+}
+
+/// Decodes the colour image of a message that was read already; as [`decode_color_message`].
+///
+/// # Errors
+/// As [`decode_color_message`].
+pub fn decode_color_image(
+    image: &Image<'_>,
+    expected: Option<ImageSize>,
+    into: &mut RgbImage,
+) -> Result<(), DecodeError> {
+    color::decode(image, expected, into)
+}
+
+/// Decodes the compressed colour image of a message that was read already; as [`decode_color_message`].
+///
+/// # Errors
+/// As [`decode_color_message`].
+pub fn decode_compressed_color(
+    image: &CompressedImage<'_>,
+    expected: Option<ImageSize>,
+    into: &mut RgbImage,
+) -> Result<(), DecodeError> {
     if image.format.contains("compressedDepth") {
         return Err(DecodeError::WrongKind { found: format!("'{}'", image.format), cure: "choose a colour topic" });
     }
@@ -132,9 +155,35 @@ pub fn decode_depth_message(
     let mut from = Reader::new(wire, bytes).map_err(damaged)?;
     if kind == MessageType::CompressedImage {
         let image = CompressedImage::read(&mut from).map_err(damaged)?;
-        return compressed_depth::decode(&image, depth_factor, expected, into);
+        return decode_compressed_depth(&image, depth_factor, expected, into);
     }
-    depth::decode(&Image::read(&mut from).map_err(damaged)?, depth_factor, expected, into)
+    decode_depth_image(&Image::read(&mut from).map_err(damaged)?, depth_factor, expected, into)
+}
+
+/// Decodes the depth image of a message that was read already; as [`decode_depth_message`].
+///
+/// # Errors
+/// As [`decode_depth_message`].
+pub fn decode_depth_image(
+    image: &Image<'_>,
+    depth_factor: f64,
+    expected: Option<ImageSize>,
+    into: &mut DepthImage,
+) -> Result<(), DecodeError> {
+    depth::decode(image, depth_factor, expected, into)
+}
+
+/// Decodes the compressed depth image of a message that was read already; as [`decode_depth_message`].
+///
+/// # Errors
+/// As [`decode_depth_message`].
+pub fn decode_compressed_depth(
+    image: &CompressedImage<'_>,
+    depth_factor: f64,
+    expected: Option<ImageSize>,
+    into: &mut DepthImage,
+) -> Result<(), DecodeError> {
+    compressed_depth::decode(image, depth_factor, expected, into)
 }
 
 fn damaged(error: WireError) -> DecodeError {

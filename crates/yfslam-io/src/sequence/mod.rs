@@ -33,7 +33,7 @@ use yfslam::config::DepthSource;
 
 use crate::error::{Error, Result};
 use crate::time::TimeMirror;
-pub use bag::TopicChoice;
+pub use bag::{TopicChoice, camera_of_topic};
 pub use ground_truth::GroundTruthReader;
 pub use image_ref::{ImageRef, ListedImage};
 pub use info::{SequenceInfo, TimeOffset};

@@ -136,7 +136,10 @@ pub fn drive(
         if interrupted.is_some() {
             break interrupted;
         }
-        let Some(frame) = source.frames.next(&mut reading) else { break None };
+        let Some(frame) = source.frames.next(&mut reading) else {
+            // Live frames end with a signal, too, because waiting for the next one ends.
+            break if source.frames.is_live() { interrupt.received() } else { None };
+        };
         let frames = distribute(frame, detector.as_deref_mut(), runs);
         std::thread::scope(|scope| {
             let mut work = runs.iter_mut().zip(&frames);

@@ -100,7 +100,7 @@ const SNAPSHOTS: usize = 5;
 const SNAPSHOTS_OF_EACH: usize = 3;
 
 /// Track a sequence; trajectory, map and report are written to a folder.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(after_help = HELP)]
 pub struct RunArgs {
     #[command(flatten)]
@@ -143,7 +143,23 @@ pub struct RunArgs {
     evaluation: EvaluationArgs,
 }
 
+/// When frames are used.
+#[derive(Clone, Copy, Debug)]
+pub enum Pace {
+    /// Each frame, however long the one before has taken.
+    EveryFrame,
+    /// As they come, at a multiple of real time; those for which there is no time are dropped. Mapping runs on its own thread.
+    Live { rate: f64 },
+}
+
 pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
+    run_at(args, Pace::EveryFrame, terminal)
+}
+
+pub fn run_at(args: &RunArgs, pace: Pace, terminal: Terminal) -> Result<()> {
+    let mut args = args.clone();
+    args.map.threaded |= matches!(pace, Pace::Live { .. });
+    let args = &args;
     let interrupt = Interrupt::watch()?;
     let mut config = args.settings.resolve()?;
     let methods = args.methods(&config)?;
@@ -174,6 +190,9 @@ pub fn run(args: &RunArgs, terminal: Terminal) -> Result<()> {
         Setup { source: &source, config: &config, map: &args.map, outputs, makes_dense_map: args.dense, terminal };
     let (mut runs, mut shared) = setup.prepare(&methods, &out, detector)?;
     let checkpoints = Checkpoints::new(args.checkpoint);
+    if let Pace::Live { rate } = pace {
+        source = source.play_live(rate, &interrupt, terminal)?;
+    }
     let driven = drive(&mut source, shared.as_mut(), &mut runs, &args.map, checkpoints, &interrupt, terminal);
     let Driven { reading, process, interrupted } = driven;
 

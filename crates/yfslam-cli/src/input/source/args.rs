@@ -21,7 +21,7 @@ pub const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Input")]
 pub struct SourceArgs {
-    /// Folder of a recording in any of the layouts of --layout, a bag (.bag, .mcap, .db3 or folder), or a synthetic world such as `synth:walking_xyz?seed=7`.
+    /// Folder of a recording in any of the layouts of --layout, a bag (.bag, .mcap, .db3 or folder), a synthetic world such as `synth:walking_xyz?seed=7`, or - for frames on standard input.
     #[arg(
         value_name = "SEQUENCE",
         help_heading = None,
@@ -180,6 +180,11 @@ impl SourceArgs {
 
     pub fn boxes_file(&self) -> PathBuf {
         self.folder().join(BOXES_FILE)
+    }
+
+    /// Returns whether frames come from standard input.
+    pub fn is_pipe(&self) -> bool {
+        self.sequence == "-"
     }
 
     /// Returns whether the sequence is a synthetic world.

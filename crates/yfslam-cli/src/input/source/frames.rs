@@ -8,7 +8,9 @@ use yfslam_io::{Delivery, FaultInjector, FrameStream};
 
 use super::args::SourceArgs;
 use super::folder;
+use super::live::LivePlayer;
 use super::masks::Masks;
+use super::pipe::{self, Pipe};
 use super::synth::Renderer;
 use crate::stats::skip::Skip;
 use crate::stats::stages::Stages;
@@ -26,6 +28,10 @@ pub enum Player {
     Folder(Box<(FrameStream, FolderExtras)>),
     /// A synthetic world.
     Synth(Renderer),
+    /// Another program, on standard input.
+    Pipe(Box<Pipe>),
+    /// Any of these, when it is time for its frames.
+    Live(Box<LivePlayer>),
 }
 
 /// Boxes and masks that belong to the frames of a recording.
@@ -41,6 +47,22 @@ impl Frames {
         Self { player, faults: FaultInjector::new(args.faults.clone(), first_ns), depth_source }
     }
 
+    /// Hands these frames to `start`, and plays what it delivers.
+    ///
+    /// # Errors
+    /// As `start`.
+    pub fn into_live(self, start: impl FnOnce(Self) -> anyhow::Result<LivePlayer>) -> anyhow::Result<Self> {
+        let depth_source = self.depth_source;
+        let player = Player::Live(Box::new(start(self)?));
+        // Faults were injected before it was time for the frames.
+        Ok(Self { player, faults: FaultInjector::new(Vec::new(), 0), depth_source })
+    }
+
+    /// Returns whether frames come when it is time for them.
+    pub fn is_live(&self) -> bool {
+        matches!(self.player, Player::Live(_))
+    }
+
     /// Returns the next frame, or why it cannot be used; `None` at the end. Adds the durations of reading to `stages`.
     pub fn next(&mut self, stages: &mut Stages) -> Option<Result<Frame, Skip>> {
         loop {
@@ -50,6 +72,8 @@ impl Frames {
             let frame = match &mut self.player {
                 Player::Folder(recording) => folder::next(&mut recording.0, &recording.1, stages),
                 Player::Synth(renderer) => renderer.next(stages).map(Ok),
+                Player::Pipe(pipe) => pipe::next(pipe),
+                Player::Live(live) => live.next(stages),
             };
             match frame {
                 Some(Ok(frame)) => self.faults.push(frame),

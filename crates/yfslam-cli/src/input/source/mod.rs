@@ -6,7 +6,9 @@ mod args;
 mod bag;
 mod folder;
 mod frames;
+mod live;
 mod masks;
+mod pipe;
 mod synth;
 
 use std::path::Path;
@@ -21,11 +23,13 @@ use yfslam_io::trajectory::mirror_trajectory;
 use yfslam_io::{CameraSource, TrajectoryFile};
 
 use crate::input::trajectory::checked_poses;
+use crate::ui::interrupt::Interrupt;
 use crate::ui::terminal::Terminal;
 pub use args::SourceArgs;
 pub use bag::describe as describe_bag;
 pub use folder::open_sequence;
 use frames::{Frames, Player};
+use live::LivePlayer;
 pub use masks::MaskTally;
 pub use synth::world_camera;
 
@@ -80,6 +84,8 @@ impl Source {
     pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[String]>) -> Result<Self> {
         let mut source = if args.is_synthetic() {
             synth::open(args, configured, own_boxes)?
+        } else if args.is_pipe() {
+            pipe::open(args, configured)?
         } else {
             folder::open(args, configured, own_boxes)?
         };
@@ -89,11 +95,21 @@ impl Source {
         Ok(source)
     }
 
+    /// Plays the frames when it is time for them; see [`LivePlayer::start`]. Frames of a pipe come as they are sent.
+    ///
+    /// # Errors
+    /// No thread can be started.
+    pub fn play_live(mut self, rate: f64, interrupt: &Interrupt, terminal: Terminal) -> Result<Self> {
+        let rate = if matches!(self.frames.player, Player::Pipe(..)) { None } else { Some(rate) };
+        self.frames = self.frames.into_live(|frames| LivePlayer::start(frames, rate, interrupt.clone(), terminal))?;
+        Ok(self)
+    }
+
     /// Returns the exact trajectory of a synthetic world.
     fn truth_of_world(&self) -> Option<Truth> {
         match &self.frames.player {
             Player::Synth(renderer) => Some(renderer.truth()),
-            Player::Folder(..) => None,
+            Player::Folder(..) | Player::Pipe(..) | Player::Live(..) => None,
         }
     }
 

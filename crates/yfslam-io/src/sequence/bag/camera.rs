@@ -121,6 +121,18 @@ fn shows_rectified(topic: &str) -> bool {
 /// What is wrong with a calibration, and what to do.
 type Refusal = (String, &'static str);
 
+/// Returns the camera of a live topic of images.
+///
+/// # Errors
+/// The calibration cannot be used, and what to do.
+pub fn camera_of_topic(info: &CameraInfo, image_topic: &str) -> std::result::Result<Camera, String> {
+    let camera =
+        camera_of(info, shows_rectified(image_topic)).map_err(|(problem, cure)| format!("{problem}; {cure}"))?;
+    let source = CameraSource::new(camera, MILLIMETRES, "camera_info");
+    check_camera(&source).map_err(|error| error.to_string())?;
+    Ok(source.camera)
+}
+
 /// Converts a calibration for images as they are, or for rectified ones.
 fn camera_of(info: &CameraInfo, is_rectified: bool) -> std::result::Result<Camera, Refusal> {
     let (width, height) = (info.width as usize, info.height as usize);

@@ -20,6 +20,7 @@ use crate::bag::{Bag, MessageRef, Need};
 use crate::error::{Error, Result};
 use crate::message::MessageType;
 use crate::time::format_stamp;
+pub use camera::camera_of_topic;
 pub use choose::TopicChoice;
 use choose::{Chosen, ImageTopic, Survey};
 use frames::Frames;
