@@ -5,13 +5,14 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use yfslam::{BoundingBox, DepthImage, Frame, Region, RgbImage, Slam};
+use yfslam::{BoundingBox, DepthImage, Frame, Region, RgbImage, Slam, Tracked, TrackingState};
 use yfslam_io::prepare_folder;
 use yfslam_io::write::write_color_png;
 
 use super::folder::remove_files;
 use crate::draw::colors::{BOX, DYNAMIC, STATIC, UNMATCHED, WEAK_BOX};
 use crate::draw::shapes::{Color, disc, rectangle, ring, tint};
+use crate::draw::text::{label, line_height};
 
 /// Folder of the images in the output folder.
 const FOLDER: &str = "overlay";
@@ -19,29 +20,30 @@ const FOLDER: &str = "overlay";
 /// Writes one image for each frame.
 pub struct Overlay {
     folder: PathBuf,
-    /// Score from which a box opens a track.
-    open_score: f32,
 }
+
+/// Colours of texts.
+const INK: Color = [255; 3];
+const PAPER: Color = [0; 3];
 
 impl Overlay {
     /// Prepares the folder `out/overlay`.
     ///
     /// # Errors
     /// Files cannot be written there.
-    pub fn prepare(out: &Path, open_score: f32) -> Result<Self> {
+    pub fn prepare(out: &Path) -> Result<Self> {
         let folder = out.join(FOLDER);
         prepare_folder(&folder)
             .with_context(|| format!("--overlay: the folder {} cannot be used", folder.display()))?;
-        Ok(Self { folder, open_score })
+        Ok(Self { folder })
     }
 
-    /// Writes the image of the frame that `slam` tracked last.
+    /// Writes the image of frame `index`.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&self, index: usize, frame: &Frame, slam: &Slam) -> Result<()> {
-        let image = draw_frame(frame, slam, self.open_score);
-        Ok(write_color_png(&self.folder.join(format!("{index:06}.png")), &image)?)
+    pub fn write(&self, index: usize, image: &RgbImage) -> Result<()> {
+        Ok(write_color_png(&self.folder.join(format!("{index:06}.png")), image)?)
     }
 }
 
@@ -55,6 +57,33 @@ pub fn remove(out: &Path) -> Result<()> {
     // It stays if it holds files of others.
     let _ = std::fs::remove_dir(folder);
     Ok(())
+}
+
+/// Draws frame `index`, which `slam` tracked last, with its number, time since the first frame, state and inliers; `tracked` is `None` if it was
+/// refused.
+pub fn draw_captioned(
+    index: usize,
+    seconds: f64,
+    frame: &Frame,
+    tracked: Option<&Tracked>,
+    slam: &Slam,
+    open_score: f32,
+) -> RgbImage {
+    let mut image = draw_frame(frame, slam, open_score);
+    let state = tracked.map_or_else(|| "refused".to_owned(), state_of);
+    let bottom = image.height() as i64 - line_height(&image);
+    label(&mut image, [0, bottom], &format!("frame {index}  {seconds:.2} s  {state}"), INK, PAPER);
+    image
+}
+
+/// Describes the state of a frame in a few words.
+pub fn state_of(tracked: &Tracked) -> String {
+    let reason = tracked.lost_reason.map_or_else(String::new, |reason| format!(": {reason}"));
+    match tracked.state {
+        TrackingState::NotInitialized => format!("initialising{reason}"),
+        TrackingState::Tracking => format!("tracking, {} inliers", tracked.inliers),
+        TrackingState::Lost => format!("lost{reason}"),
+    }
 }
 
 /// Draws the frame that `slam` tracked last; boxes from `open_score` on open a track.
@@ -75,6 +104,10 @@ pub fn draw_frame(frame: &Frame, slam: &Slam, open_score: f32) -> RgbImage {
             true => ring(&mut image, feature.raw, 1.5, 2.5, STATIC),
             false => disc(&mut image, feature.raw, 1.0, UNMATCHED),
         }
+    }
+    for detection in slam.detections() {
+        let (score, at) = (detection.score, [detection.bbox.x_min as i64, detection.bbox.y_min as i64]);
+        label(&mut image, at, &format!("{score:.2}"), if score >= open_score { BOX } else { WEAK_BOX }, PAPER);
     }
     image
 }

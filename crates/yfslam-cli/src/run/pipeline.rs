@@ -41,6 +41,8 @@ pub struct Pipeline {
     state: TrackingState,
     /// Largest number of features, and of static features with depth, in a frame before initialisation.
     best_start: (usize, usize),
+    /// The result of the last frame; `None` if it was refused.
+    last: Option<Tracked>,
 }
 
 /// The results of a run.
@@ -83,11 +85,13 @@ impl Pipeline {
             started: Instant::now(),
             state: TrackingState::default(),
             best_start: (0, 0),
+            last: None,
         }
     }
 
     /// Tracks one frame and returns the state after it; a frame that SLAM refuses is counted as skipped.
     pub fn track(&mut self, frame: &Frame) -> TrackingState {
+        self.last = None;
         let started = Instant::now();
         let (result, cpu) = cpu::timed(|| self.slam.track(frame));
         let tracked = match result {
@@ -116,7 +120,14 @@ impl Pipeline {
         } else if self.frames.tracked == 0 {
             self.update_best_start();
         }
-        tracked.state
+        let state = tracked.state;
+        self.last = Some(tracked);
+        state
+    }
+
+    /// Returns the result of the last frame; `None` if it was refused.
+    pub fn last(&self) -> Option<&Tracked> {
+        self.last.as_ref()
     }
 
     /// Counts a frame that cannot be used.

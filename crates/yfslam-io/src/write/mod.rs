@@ -1,5 +1,6 @@
 //! The products of a run as files: recordings, point clouds, meshes, octrees, occupancy grids, images.
 
+mod jpeg;
 mod nav2;
 mod octomap;
 mod pcd;
@@ -7,6 +8,7 @@ mod ply;
 mod png;
 mod recording;
 
+pub use jpeg::encode_jpeg;
 pub use nav2::write_nav2;
 pub use octomap::{OctreeFormat, OctreeSize, OctreeVoxel, write_octomap};
 pub use pcd::write_pcd;
