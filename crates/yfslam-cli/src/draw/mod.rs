@@ -3,7 +3,6 @@
 pub mod animated_png;
 pub mod colors;
 pub mod dense_image;
-pub mod indexed_png;
 pub mod shapes;
 pub mod shrink;
 pub mod text;

@@ -1,19 +1,21 @@
 //! Images of what the dynamic filter decided, in the manner of the YF-SLAM paper's Fig. 7.
 //!
-//! In: a frame and the system that has just tracked it. Out: its image, and `overlay/000123.png`.
+//! In: a frame and the system that has just tracked it. Out: its image, and `overlay/000123.jpg`.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use yfslam::{BoundingBox, DepthImage, Frame, Region, RgbImage, Slam, Tracked, TrackingState};
-use yfslam_io::prepare_folder;
-use yfslam_io::write::write_color_png;
+use yfslam_io::write::encode_jpeg;
+use yfslam_io::{prepare_folder, write_atomically};
 
 use super::folder::remove_files;
 use crate::draw::colors::{BOX, DYNAMIC, STATIC, UNMATCHED, WEAK_BOX};
 use crate::draw::shapes::{Color, disc, rectangle, ring, tint};
 use crate::draw::text::{label, line_height};
 
+/// Quality of the images.
+const QUALITY: u8 = 90;
 /// Folder of the images in the output folder.
 const FOLDER: &str = "overlay";
 
@@ -43,7 +45,8 @@ impl Overlay {
     /// # Errors
     /// The file cannot be written.
     pub fn write(&self, index: usize, image: &RgbImage) -> Result<()> {
-        Ok(write_color_png(&self.folder.join(format!("{index:06}.png")), image)?)
+        let jpeg = encode_jpeg(image, QUALITY).context("--overlay: the image is too large for JPEG")?;
+        Ok(write_atomically(&self.folder.join(format!("{index:06}.jpg")), |file| file.write_all(&jpeg))?)
     }
 }
 
@@ -114,7 +117,9 @@ pub fn draw_frame(frame: &Frame, slam: &Slam, open_score: f32) -> RgbImage {
 
 /// Returns whether [`Overlay::write`] gives files such a name.
 fn is_overlay(name: &str) -> bool {
-    name.strip_suffix(".png").is_some_and(|stem| stem.len() >= 6 && stem.bytes().all(|b| b.is_ascii_digit()))
+    // Earlier versions wrote PNG.
+    let stem = name.strip_suffix(".jpg").or_else(|| name.strip_suffix(".png"));
+    stem.is_some_and(|stem| stem.len() >= 6 && stem.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Tints the pixels at the depth of the moving object; all pixels of the box if the region has no range of depth.
@@ -145,8 +150,8 @@ mod tests {
 
     #[test]
     fn only_images_of_an_earlier_run_are_removed() {
-        assert!(is_overlay("000123.png") && is_overlay("1000000.png"));
-        for name in ["123.png", "000123.jpg", "00012a.png", "holiday.png", "000123"] {
+        assert!(is_overlay("000123.png") && is_overlay("1000000.jpg"));
+        for name in ["123.png", "000123.jpeg", "00012a.jpg", "holiday.jpg", "000123"] {
             assert!(!is_overlay(name), "{name}");
         }
     }

@@ -48,7 +48,9 @@ fn angle(scene: &Scene, name: &'static str, k: usize) -> Option<Captioned> {
         .collect();
     let best = each.iter().map(|(_, v)| *v).fold(f64::INFINITY, f64::min).max(1e-6);
     let axis = if worst / best > LOG_FROM_RATIO {
-        Axis::symlog_degrees("error (°), logarithmic", worst, 10f64.powf(best.log10().ceil()))
+        // Below the smallest of the largest errors, so that there is something of every method in the logarithmic part.
+        let threshold = 10f64.powf(best.log10().floor());
+        Axis::symlog_degrees(format!("error (°), logarithmic beyond ±{threshold}°"), worst, threshold)
     } else {
         let limit = worst.max(1e-6) * 1.1;
         Axis::linear("error (°)", [-limit, limit], 4, 1.0)
