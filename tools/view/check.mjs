@@ -4,12 +4,12 @@
 import { spawn } from 'node:child_process';
 import { mkdtempSync, mkdirSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { join } from 'node:path';
+import { join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 
-const { chromium } = createRequire(join(process.env.MODULES || 'target/view', 'x'))('playwright-core');
+const { chromium } = createRequire(resolve(process.env.MODULES || 'target/view', 'x'))('playwright-core');
 
 const [program, shots] = [process.argv[2] || 'target/release/yfslam', process.argv[3] || mkdtempSync(join(tmpdir(), 'yfslam-view-'))];
 const data = process.env.YFSLAM_DATA;
@@ -100,9 +100,11 @@ await check('demo: images, map, people and plots; keys, pause, step, looking bac
   await page.keyboard.press('3');
   assert.equal((await state(page)).mode, 'top');
   await page.waitForTimeout(200);
+  assert.ok((await hasMap(page)) > 0.01, 'the map is drawn from above');
   await shot(page, 'demo-top');
   await page.keyboard.press('2');
   await page.waitForTimeout(200);
+  assert.ok((await hasMap(page)) > 0.01, 'the map is drawn from behind the camera');
   await shot(page, 'demo-follow');
   await page.keyboard.press('1');
   await page.focus('#scene');
@@ -126,6 +128,25 @@ await check('demo: images, map, people and plots; keys, pause, step, looking bac
   assert.deepEqual(page.problems, []);
   assert.match(await page.textContent('#state'), /ended/);
   await page.context().close();
+});
+
+await check('report: map in three dimensions', async () => {
+  const out = mkdtempSync(join(tmpdir(), 'yfslam-report-'));
+  const child = spawn(program, ['demo', '--frames', '60', '-o', out, '--quiet']);
+  assert.equal(await new Promise((done) => child.on('exit', done)), 0);
+  for (const colorScheme of ['light', 'dark']) {
+    const url = pathToFileURL(join(out, 'report.html')).href;
+    const page = await open(url, { colorScheme, height: 1000 });
+    await page.waitForFunction(() => window.yfMapScene && window.yfMapScene.draws > 0);
+    const items = await page.evaluate(() => [...window.yfMapScene.items].map(([id, item]) => [id, item.count, item.visible]));
+    assert.ok(items.find(([id, count, visible]) => id === 'landmarks3' && count > 300 && visible), JSON.stringify(items));
+    assert.ok(items.find(([id, count, visible]) => id === 'landmarks0' && count > 100 && !visible), JSON.stringify(items));
+    assert.ok(items.find(([id, count]) => id === 'truth' && count > 50), JSON.stringify(items));
+    await (await page.$('#map3d')).screenshot({ path: join(shots, `report-map-${colorScheme}.png`) });
+    await page.screenshot({ path: join(shots, `report-${colorScheme}.png`), fullPage: true });
+    assert.deepEqual(page.problems, []);
+    await page.context().close();
+  }
 });
 
 await check('dark page, and a phone', async () => {

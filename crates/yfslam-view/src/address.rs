@@ -98,7 +98,7 @@ mod tests {
         assert_eq!(parsed("robot.local:80").unwrap(), "robot.local:80");
         assert_eq!(parsed("::1").unwrap(), "[::1]");
         assert_eq!(parsed("[::1]:9000").unwrap(), "[::1]:9000");
-        for wrong in ["", ":80", "a b", "host:port", "http://x/", "70000x"] {
+        for wrong in ["", ":80", "a b", "host:port", "http://x/", "host:70000"] {
             assert!(parsed(wrong).unwrap_err().contains("such as 8788"), "{wrong}");
         }
     }

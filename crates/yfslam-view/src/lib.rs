@@ -28,7 +28,7 @@ pub use address::Address;
 pub use view::{View, ViewOptions};
 
 /// Draws points and lines with WebGL 2: the function `yfScene`, which pages of reports use, too.
-pub const SCENE_SCRIPT: &str = include_str!("page/scene.js");
+pub static SCENE_SCRIPT: &str = include_str!("page/scene.js");
 
 /// The example of the README.
 #[cfg(doctest)]

@@ -21,16 +21,19 @@ const LONGEST_WAIT: Duration = Duration::from_secs(1);
 /// Largest multiple of the speed of a recording.
 const MAX_SPEED: f64 = 100.0;
 
-/// The page: markup, style and scripts.
-const PAGE: [&str; 7] = [
-    include_str!("page/head.html"),
-    include_str!("page/view.css"),
-    include_str!("page/body.html"),
-    crate::SCENE_SCRIPT,
-    include_str!("page/plot.js"),
-    include_str!("page/view.js"),
-    "</script></body></html>",
-];
+/// Returns the page: markup, style and scripts.
+fn page() -> [&'static str; 7] {
+    [
+        include_str!("page/head.html"),
+        include_str!("page/view.css"),
+        include_str!("page/body.html"),
+        crate::SCENE_SCRIPT,
+        include_str!("page/plot.js"),
+        include_str!("page/view.js"),
+        "</script></body></html>",
+    ]
+}
+
 /// The page may load nothing from elsewhere and may not be put into other pages.
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src blob: data:; connect-src 'self'; \
                       base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -101,7 +104,7 @@ impl Server {
 
     fn answer(&self, request: &Request, stream: &TcpStream) -> io::Result<()> {
         match (request.method.as_str(), request.path.as_str()) {
-            ("GET", "/") => send(stream, "200 OK", "text/html; charset=utf-8", &PAGE.map(str::as_bytes)),
+            ("GET", "/") => send(stream, "200 OK", "text/html; charset=utf-8", &page().map(str::as_bytes)),
             ("GET", "/hello") => send(stream, "200 OK", "application/octet-stream", &[&self.hello]),
             ("GET", "/next") => self.next(request, stream),
             ("POST", "/control") => {
@@ -206,7 +209,7 @@ mod tests {
 
     #[test]
     fn the_page_has_less_than_60_kb_and_loads_nothing() {
-        let page = PAGE.concat();
+        let page = page().concat();
         assert!(page.len() <= 60_000, "{} bytes", page.len());
         for foreign in ["http://", "https://", "src=\"", "@import", "url("] {
             let allowed = page.matches(foreign).filter(|_| foreign.starts_with("http")).count();

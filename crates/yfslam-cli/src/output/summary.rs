@@ -105,7 +105,7 @@ pub fn of_several(runs: &[ReportedRun], truth: Option<&Truth>) -> String {
     let kind =
         results.iter().find_map(|result| result.evaluation()).map_or(AlignmentKind::Se3, |e| e.ate.alignment.kind);
     let ate = format!("ATE, {kind} (m)");
-    let headers = [ate.as_str(), "RMSE", "S.D.", "mean", "median", "max", "RMSE, −%", "S.D., −%", "tracked"];
+    let headers = [ate.as_str(), "RMSE", "S.D.", "mean", "median", "max", "less RMSE (%)", "less S.D. (%)", "tracked"];
     let mut table = Table::new(headers);
     let errors_of = |result: &RunResult| result.evaluation().map(|e| e.ate.translation_m);
     let original = results.first().and_then(|result| errors_of(result));

@@ -25,7 +25,7 @@ function yfScene(canvas, changed) {
     for (const name of ['m', 's', 'k', 'a', 'r']) at[name] = gl.getUniformLocation(program, name);
   };
   begin();
-  const scene = { mode: 'orbit', grid: 1, draws: 0, items, target: [0, 0, 2], yaw: -0.6, pitch: 0.55, distance: 5, pose: null, touched: false };
+  const scene = { mode: 'orbit', grid: 1, draws: 0, items, target: [0, 0, 2], yaw: -0.6, pitch: 0.55, heading: 0, distance: 5, pose: null, touched: false };
 
   // Column by column, as WebGL.
   const multiply = (a, b) => {
@@ -46,7 +46,7 @@ function yfScene(canvas, changed) {
       const p = scene.pose;
       yaw += Math.atan2(p[8], p[10]) + 0.6;
       target = [p[12] + p[8], p[13] + p[9], p[14] + p[10]];
-    } else if (scene.mode === 'top') yaw = scene.turn || 0;
+    } else if (scene.mode === 'top') yaw = scene.heading;
     const forward = [Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch), Math.cos(pitch) * Math.cos(yaw)];
     const right = [Math.cos(yaw), 0, -Math.sin(yaw)];
     const down = cross(forward, right);
@@ -182,7 +182,7 @@ function yfScene(canvas, changed) {
   }
   function turn(dx, dy) {
     scene.touched = true;
-    if (scene.mode === 'top') scene.turn = (scene.turn || 0) - dx;
+    if (scene.mode === 'top') scene.heading -= dx;
     else { scene.yaw += dx; scene.pitch = Math.max(-1.5, Math.min(1.55, scene.pitch + dy)); }
     redraw();
   }
