@@ -81,7 +81,7 @@ async function check(name, work) {
 await check('demo: images, map, people and plots; keys, pause, step, looking back', async () => {
   const run = start('demo', '--frames', '90');
   const page = await open(await run.url);
-  await page.waitForFunction(() => window.yfslam.frames > 25 && window.yfslam.points > 200 && window.yfslam.patches > 0, null, { timeout: 60000 });
+  await page.waitForFunction(() => window.yfslam.shown > 60 && window.yfslam.points > 200 && window.yfslam.patches > 0, null, { timeout: 60000 });
   await page.keyboard.press('Space');
   await page.waitForFunction(() => window.yfslam.paused);
   await page.waitForTimeout(1500);
@@ -97,6 +97,8 @@ await check('demo: images, map, people and plots; keys, pause, step, looking bac
   assert.equal((await state(page)).shown, paused.shown + 1, 'a step is one frame');
   assert.ok((await hasMap(page)) > 0.01, 'the map is drawn');
   await shot(page, 'demo-light');
+  // The picture of the readme.
+  await page.screenshot({ path: join(shots, 'live-view.jpg'), type: 'jpeg', quality: 82 });
   await page.keyboard.press('3');
   assert.equal((await state(page)).mode, 'top');
   await page.waitForTimeout(200);
