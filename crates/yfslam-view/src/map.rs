@@ -61,7 +61,7 @@ impl MapCopy {
                 edges.extend(to.map(|to| [from, to, kind as u32]));
             }
         }
-        let count = map.landmarks().count();
+        let count = map.landmarks().size_hint().0;
         let every = count.div_ceil(MAX_LANDMARKS).max(1);
         let (mut positions, mut colors) =
             (Vec::with_capacity(3 * count / every), Vec::with_capacity(3 * count / every));

@@ -51,13 +51,14 @@ impl Moment {
             features,
             matched,
             tracked: tracked.clone(),
-            landmarks: slam.map().landmarks().count(),
+            // The iterator has its length; to count would visit every landmark.
+            landmarks: slam.map().landmarks().size_hint().0,
             keyframes: slam.map().keyframe_count(),
         }
     }
 
-    /// Makes the packet.
-    pub fn encode(&self, cells: &Cells, start_ns: i64) -> Numbered {
+    /// Makes the packet; `ticks` are number, time in seconds, inliers and duration in ms of the frames that the page does not know yet.
+    pub fn encode(&self, ticks: &[[f64; 4]], cells: &Cells, start_ns: i64) -> Numbered {
         let Self { tracked, features, .. } = self;
         let image = bounded(&self.frame.color);
         let size = [self.frame.color.width(), self.frame.color.height()];
@@ -67,6 +68,7 @@ impl Moment {
         let pose = tracked.t_world_cam.map(|pose| pose.to_homogeneous().as_slice().to_vec());
         let head = json!({
             "number": self.number,
+            "ticks": ticks,
             "t": seconds(tracked.timestamp_ns, start_ns),
             "state": state_name(tracked.state),
             "reason": tracked.lost_reason.map(|reason| reason.to_string()),
@@ -105,7 +107,7 @@ fn state_name(state: TrackingState) -> &'static str {
 }
 
 /// Returns the wall times of features, detector, filter, tracking, mapping, loops and dense map, ms.
-fn times_ms(times: &StageTimes) -> [f64; 7] {
+pub fn times_ms(times: &StageTimes) -> [f64; 7] {
     let StageTimes { features, detector_wait, dynamic, tracking, mapping, loops, .. } = *times;
     let dense = times.dense_patch + times.dense_map;
     [features, detector_wait, dynamic, tracking, mapping, loops, dense]

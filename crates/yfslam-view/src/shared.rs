@@ -13,6 +13,8 @@ use crate::packet::{Numbered, Packet};
 const MAX_PATCHES: usize = 400;
 /// Keyframes that wait for the encoder.
 const MAX_WAITING: usize = 8;
+/// Frames whose figures wait for the next frame that is encoded.
+const MAX_TICKS: usize = 500;
 /// Patches in one answer.
 const PATCHES_AT_ONCE: usize = 8;
 /// Time after which a viewer that does not ask counts no longer.
@@ -37,6 +39,8 @@ pub struct State {
     pub start_ns: Option<i64>,
     /// When a viewer last asked for anything.
     pub asked: Option<Instant>,
+    /// Whether the encoder shall not wait until a frame is due.
+    pub hurries: bool,
     /// Whether there will be no more frames.
     pub ended: bool,
     /// Whether the threads shall end.
@@ -70,6 +74,10 @@ pub struct RunState {
     pub asked: Option<Instant>,
     /// Before this instant the map is not copied again.
     pub next_copy: Option<Instant>,
+    /// Before this instant no frame is encoded, unless the run is paused.
+    pub next_frame: Option<Instant>,
+    /// Number, time in seconds, inliers and duration in ms of frames since the last one that was encoded.
+    pub ticks: Vec<[f64; 4]>,
     pub is_encoding: bool,
 }
 
@@ -141,6 +149,14 @@ impl State {
 }
 
 impl RunState {
+    /// Notes the figures of a frame that is not encoded; the oldest are forgotten.
+    pub fn tick(&mut self, figures: [f64; 4]) {
+        if self.ticks.len() >= MAX_TICKS {
+            self.ticks.remove(0);
+        }
+        self.ticks.push(figures);
+    }
+
     /// Takes a frame for the encoder; one that waits is replaced.
     pub fn offer(&mut self, moment: Moment) {
         self.moment = Some(moment);
@@ -160,6 +176,16 @@ impl RunState {
             self.patches.pop_front();
         }
         self.patches.push_back(patch);
+    }
+
+    /// Returns whether the newest frame is to be encoded.
+    pub fn is_frame_due(&self, at_once: bool) -> bool {
+        self.moment.is_some() && (at_once || self.next_frame.is_none_or(|due| due <= Instant::now()))
+    }
+
+    /// Returns whether there is work for the encoder.
+    pub fn is_due(&self, at_once: bool) -> bool {
+        self.is_frame_due(at_once) || !self.keyframes.is_empty() || self.copy.is_some()
     }
 
     /// Returns whether nothing waits for the encoder.

@@ -16,7 +16,7 @@ use crate::cells::{Cells, Keyframe};
 use crate::encoder::Encoder;
 use crate::guard::Guard;
 use crate::map::MapCopy;
-use crate::moment::Moment;
+use crate::moment::{Moment, times_ms};
 use crate::packet::seconds;
 use crate::server::{Server, hello};
 use crate::shared::{RunState, Shared, State};
@@ -119,10 +119,13 @@ impl View {
     pub fn show(&self, run: usize, frame: &Frame, tracked: &Tracked, slam: &Slam) {
         let (number, is_watched, is_map_due) = {
             let mut state = self.shared.lock();
-            state.start_ns.get_or_insert(frame.timestamp_ns);
+            let start_ns = *state.start_ns.get_or_insert(frame.timestamp_ns);
             let (is_watched, has_viewer) = (state.is_watched(run), state.has_viewer());
             let Some(run) = state.runs.get_mut(run) else { return };
             run.frames += 1;
+            if is_watched {
+                run.tick(figures(run.frames, tracked, start_ns));
+            }
             let is_map_due = has_viewer && run.copy.is_none() && run.next_copy.is_none_or(|due| due <= Instant::now());
             (run.frames, is_watched, is_map_due)
         };
@@ -222,6 +225,7 @@ impl Drop for View {
     /// Sends the last state to the pages that are open, and stops.
     fn drop(&mut self) {
         let until = Instant::now() + LAST_WORDS;
+        self.shared.change(|state| state.hurries = true);
         let mut state = self.shared.lock();
         let is_idle = |state: &State| !state.has_viewer() || state.runs.iter().all(RunState::is_idle);
         while !is_idle(&state) && Instant::now() < until {
@@ -265,6 +269,12 @@ fn copied(slam: &Slam) -> (MapCopy, Instant) {
     let started = Instant::now();
     let copy = MapCopy::new(slam);
     (copy, Instant::now() + MAP_EVERY.max(started.elapsed() * MAP_SHARE))
+}
+
+/// Returns number, time, inliers and duration of a frame.
+fn figures(number: u64, tracked: &Tracked, start_ns: i64) -> [f64; 4] {
+    let ms = times_ms(&tracked.times).iter().sum();
+    [number as f64, seconds(tracked.timestamp_ns, start_ns), tracked.inliers as f64, ms]
 }
 
 /// Returns what the page learns once.

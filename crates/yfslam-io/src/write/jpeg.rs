@@ -14,6 +14,9 @@ const MAX_SIDE_PX: usize = 65_535;
 /// The scale factors of the transform of Arai, Agui and Nakajima, by which the quantisation is divided.
 const SCALES: [f32; 8] = [1.0, 1.387_039_8, 1.306_563, 1.175_875_6, 1.0, 0.785_694_96, 0.541_196_1, 0.275_899_38];
 
+/// 1.5 · 2²³: numbers near it are whole.
+const ROUND: f32 = 12_582_912.0;
+
 /// A block of 8 × 8 values, row by row.
 type Block = [[f32; 8]; 8];
 
@@ -82,12 +85,18 @@ fn macroblock(image: &RgbImage, left: usize, top: usize) -> ([Block; 4], [Block;
             Some(inside) => pixels.copy_from_slice(inside),
             None => pixels.iter_mut().enumerate().for_each(|(x, pixel)| *pixel = row[(left + x).min(last)]),
         }
-        for (x, pixel) in pixels.iter().enumerate() {
-            let [r, g, b] = pixel.map(f32::from);
-            luma[2 * (y / 8) + x / 8][y % 8][x % 8] = 0.299 * r + 0.587 * g + 0.114 * b - 128.0;
-            // The mean of four pixels.
-            chroma[0][y / 2][x / 2] += 0.25 * (-0.168_736 * r - 0.331_264 * g + 0.5 * b);
-            chroma[1][y / 2][x / 2] += 0.25 * (0.5 * r - 0.418_688 * g - 0.081_312 * b);
+        let [r, g, b] =
+            [0, 1, 2].map(|channel| -> [f32; 16] { std::array::from_fn(|x| f32::from(pixels[x][channel])) });
+        let mix = |by: [f32; 3]| -> [f32; 16] { std::array::from_fn(|x| by[0] * r[x] + by[1] * g[x] + by[2] * b[x]) };
+        let bright = mix([0.299, 0.587, 0.114]);
+        for (half, values) in bright.chunks_exact(8).enumerate() {
+            luma[2 * (y / 8) + half][y % 8] = std::array::from_fn(|x| values[x] - 128.0);
+        }
+        // The mean of four pixels.
+        let colors = [mix([-0.168_736, -0.331_264, 0.5]), mix([0.5, -0.418_688, -0.081_312])];
+        for (block, values) in chroma.iter_mut().zip(colors) {
+            let line = &mut block[y / 2];
+            *line = std::array::from_fn(|x| line[x] + 0.25 * (values[2 * x] + values[2 * x + 1]));
         }
     }
     (luma, chroma)
@@ -118,9 +127,8 @@ impl Plane {
         let mut levels = [0i32; 64];
         let scaled = transposed.as_flattened().iter().zip(self.factors.as_flattened());
         for (level, (value, factor)) in levels.iter_mut().zip(scaled) {
-            let value = value * factor;
-            // Rounds without a call into the mathematics library.
-            *level = (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32;
+            // Adding a large number rounds, without a conversion that has to check the range.
+            *level = (value * factor + ROUND).to_bits() as i32 - ROUND.to_bits() as i32;
         }
         // The rows of the transposed block are the columns of the file.
         let mut ordered = ZIGZAG.map(|at| levels[usize::from(at % 8 * 8 + at / 8)].clamp(-1023, 1023));
@@ -189,8 +197,12 @@ struct Bits {
 
 impl Bits {
     fn put(&mut self, (code, length): (u16, u8)) {
-        self.waiting = self.waiting << length | u64::from(code);
-        self.count += u32::from(length);
+        self.put_bits(u32::from(code), u32::from(length));
+    }
+
+    fn put_bits(&mut self, bits: u32, length: u32) {
+        self.waiting = self.waiting << length | u64::from(bits);
+        self.count += length;
         while self.count >= 8 {
             self.count -= 8;
             let byte = (self.waiting >> self.count) as u8;
@@ -205,9 +217,10 @@ impl Bits {
     /// Writes the code for a number of zeros and the size of a value, then the value.
     fn put_level(&mut self, codes: &[(u16, u8); 256], zeros: usize, value: i32) {
         let size = 32 - value.unsigned_abs().leading_zeros();
-        self.put(codes[zeros << 4 | size as usize]);
+        let (code, length) = codes[zeros << 4 | size as usize];
         let value = if value < 0 { value - 1 } else { value };
-        self.put(((value & ((1 << size) - 1)) as u16, size as u8));
+        let value = value as u32 & ((1 << size) - 1);
+        self.put_bits(u32::from(code) << size | value, u32::from(length) + size);
     }
 
     fn finish(mut self) -> Vec<u8> {

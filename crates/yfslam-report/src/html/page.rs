@@ -277,7 +277,7 @@ fn snapshots(report: &Report) -> Markup {
             }
             div.images.grid[one] {
                 @for frame in frames {
-                    div.snapshot.two[report.methods.len() % 2 == 0] {
+                    div.snapshot.two[report.methods.len().is_multiple_of(2)] {
                         @for (index, method) in report.methods.iter().enumerate() {
                             @if let Some(snapshot) = method.snapshots.iter().find(|p| p.frame == frame) {
                                 (show_snapshot(method, index, snapshot))

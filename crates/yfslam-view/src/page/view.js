@@ -5,7 +5,7 @@
   // Frames that are kept for looking back, and their images, bytes.
   const KEPT = 3000, KEPT_BYTES = 96e6, MAX_PLOT = 20000;
   const app = (window.yfslam = {
-    frames: 0, points: 0, keyframes: 0, patches: 0, edges: 0, movers: 0, features: 0, state: 'connecting', reason: null, error: null, run: 0, paused: false, ended: false,
+    frames: 0, ticks: 0, points: 0, keyframes: 0, patches: 0, edges: 0, movers: 0, features: 0, state: 'connecting', reason: null, error: null, run: 0, paused: false, ended: false,
     gl: false, connected: false, past: false, shown: 0, loops: 0, bytes: 0,
   });
   const scene = yfScene($('scene'), note);
@@ -20,7 +20,7 @@
     [history, kept, plots, keyframes, patches] = [[], 0, { t: [], inliers: [], ms: [] }, new Map(), new Map()];
     [shown, past] = [null, null];
     if (scene) for (const id of [...scene.items.keys()]) if (id !== 'grid' && !String(id).startsWith('path')) scene.remove(id);
-    Object.assign(app, { frames: 0, points: 0, keyframes: 0, patches: 0, edges: 0, movers: 0, loops: 0 });
+    Object.assign(app, { frames: 0, ticks: 0, points: 0, keyframes: 0, patches: 0, edges: 0, movers: 0, loops: 0 });
   }
 
   function* packets(buffer) {
@@ -92,7 +92,9 @@
     frame(packet) {
       seen.frame = packet.number;
       packet.ms = packet.times.reduce((a, b) => a + b, 0);
-      plots.t.push(packet.t); plots.inliers.push(packet.inliers); plots.ms.push(packet.ms);
+      // Not every frame is sent, but the figures of all are.
+      for (const [, t, inliers, ms] of packet.ticks) { plots.t.push(t); plots.inliers.push(inliers); plots.ms.push(ms); }
+      app.ticks += packet.ticks.length;
       if (plots.t.length > MAX_PLOT) for (const values of Object.values(plots)) values.splice(0, MAX_PLOT / 10);
       history.push(packet);
       kept += packet.image.byteLength;
