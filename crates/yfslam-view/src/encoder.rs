@@ -10,7 +10,7 @@ use crate::moment::Moment;
 use crate::shared::Shared;
 
 /// Frames are encoded so seldom that they take one of so many parts of the time of a processor core.
-const FRAME_SHARE: u32 = 40;
+const FRAME_SHARE: u32 = 30;
 /// The same for maps.
 const MAP_SHARE: u32 = 100;
 

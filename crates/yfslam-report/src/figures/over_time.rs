@@ -52,7 +52,7 @@ fn angle(scene: &Scene, name: &'static str, k: usize) -> Option<Captioned> {
         // Below the smallest of the largest errors, so that there is something of every method in the logarithmic part.
         let threshold = 10f64.powf(best.log10().floor());
         scale = format!(" Logarithmic beyond ±{threshold}°.");
-        Axis::symlog_degrees("error (°)", worst, threshold)
+        Axis::symlog_degrees("error (°), logarithmic", worst, threshold)
     } else {
         let limit = worst.max(1e-6) * 1.1;
         Axis::linear("error (°)", [-limit, limit], 4, 1.0)

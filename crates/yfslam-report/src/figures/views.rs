@@ -12,6 +12,8 @@ use super::series::{At, ErrorAt};
 /// Extent of a view relative to that of the ground truth, beyond which estimates are clipped: otherwise a very large error of one method
 /// would shrink the other trajectories to a dot.
 const ROOM: f64 = 2.5;
+/// Most poses of a part of a trajectory that is drawn in the colours of its error; of more, every n-th is drawn.
+const MAX_SHADED: usize = 1500;
 /// Ratio of the errors of two colours.
 const STEP_FACTOR: f64 = 2.5;
 /// Smallest extent of a view, m.
@@ -85,7 +87,7 @@ fn shaded(scene: &Scene, index: usize, flat: &impl Fn(&At) -> Point, step_of: &i
     let errors: Vec<&ErrorAt> = method.series.all_errors().collect();
     for part in &method.series.track {
         let mut line: (Vec<Point>, usize) = (Vec::new(), 0);
-        for at in part {
+        for at in part.iter().step_by(part.len().div_ceil(MAX_SHADED).max(1)) {
             // The errors are in order of time, and one may be missing.
             let next = errors.partition_point(|error| error.time_s < at.time_s - 1e-6);
             let step = errors.get(next).map_or(line.1, |error| step_of(error.translation_m));

@@ -92,8 +92,8 @@ fn script(report: &Report) -> String {
         format!("{{path:\"{}\",matrix:[{}]}}", positions(&shown, MAX_POSES), matrix_text(&inverse))
     });
     let _ = write!(data, "],truth:{}}};", truth.as_deref().unwrap_or("null"));
-    // Text of the program only: no script can end early.
-    [report.scene_script, &data, include_str!("map3d.js")].join("\n")
+    // Only text of the program and numbers: no script can end early. The marks keep the page well-formed XML.
+    ["//<![CDATA[", report.scene_script, &data, include_str!("map3d.js"), "//]]>"].join("\n")
 }
 
 /// Returns the alignment of a method with the ground truth.
