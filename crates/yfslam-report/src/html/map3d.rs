@@ -37,7 +37,7 @@ pub fn map3d(report: &Report) -> Markup {
                 div {
                     select #map-method aria-label="Method" {
                         @for (index, method) in report.methods.iter().enumerate() {
-                            option value=(index) selected[index + 1 == report.methods.len()] { (method.name) }
+                            option value=(index) selected=[(index + 1 == report.methods.len()).then_some("selected")] { (method.name) }
                         }
                     }
                     button #map-orbit aria-pressed="true" { "Orbit" }
