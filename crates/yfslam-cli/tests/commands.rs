@@ -91,7 +91,7 @@ fn the_demo_compares_all_methods_and_says_where_the_boxes_come_from() {
     let output = succeeds(folder.path(), &["demo", "--frames", "24", "--out", "demo"]);
     assert!(output.stdout.contains("boxes: exact, from the renderer"), "{}", output.stdout);
     assert!(output.stderr.contains("--method none,boxes,yf,full --report --out demo"), "{}", output.stderr);
-    assert!(output.stdout.contains("improve RMSE (%)"), "{}", output.stdout);
+    assert!(output.stdout.contains("less RMSE (%)"), "{}", output.stdout);
     let mut errors_m = Vec::new();
     for method in ["none", "boxes", "yf", "full"] {
         let out = folder.path().join("demo").join(method);

@@ -64,18 +64,18 @@ fn images_that_can_no_longer_be_written_do_not_end_the_run() {
     let overlay = folder.path().join("out/overlay");
     fs::create_dir_all(&overlay).unwrap();
     // The fourth image has the name of a folder.
-    fs::create_dir(overlay.join("000003.png")).unwrap();
+    fs::create_dir(overlay.join("000003.jpg")).unwrap();
     // An earlier image that cannot be removed is found before the run.
-    fails(folder.path(), &run(&["--overlay"]), &["cannot remove the old", "000003.png", "choose another folder"]);
-    fs::remove_dir(overlay.join("000003.png")).unwrap();
+    fails(folder.path(), &run(&["--overlay"]), &["cannot remove the old", "000003.jpg", "choose another folder"]);
+    fs::remove_dir(overlay.join("000003.jpg")).unwrap();
     let mut child = program(folder.path(), &run(&["--overlay"])).spawn().unwrap();
     while !folder.path().join("out/config.toml").is_file() {
         std::thread::sleep(Duration::from_millis(1));
     }
-    fs::create_dir_all(overlay.join("000011.png")).unwrap();
+    fs::create_dir_all(overlay.join("000011.jpg")).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(1));
     assert_whole(&folder.path().join("out"));
-    assert!(overlay.join("000010.png").is_file());
+    assert!(overlay.join("000010.jpg").is_file());
 }
 
 #[test]
@@ -108,7 +108,7 @@ fn what_is_known_before_a_run_is_refused_before_it() {
 fn a_run_in_the_folder_of_an_earlier_one_leaves_none_of_its_results() {
     let folder = folder_with_results();
     let out = folder.path().join("out");
-    for name in ["trajectory.txt", "dense.map", "report.html", "overlay/000000.png"] {
+    for name in ["trajectory.txt", "dense.map", "report.html", "overlay/000000.jpg"] {
         assert!(out.join(name).is_file(), "{name}");
     }
     fs::write(out.join("notes.txt"), "mine").unwrap();

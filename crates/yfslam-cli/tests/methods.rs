@@ -138,7 +138,7 @@ fn methods_are_compared_on_a_recording_as_on_a_world() {
     let world = WALKING.trim_start_matches("synth:");
     succeeds(folder.path(), &["synth", world, "--out", "rec", "-q"]);
     let output = succeeds(folder.path(), &["run", "rec", "--method", "none,yf", "--report", "--out", "out"]);
-    for words in ["boxes: exact, from the recording's boxes.json", "improve RMSE (%)", "30 of 30"] {
+    for words in ["boxes: exact, from the recording's boxes.json", "less RMSE (%)", "30 of 30"] {
         assert!(output.stdout.contains(words), "no '{words}' in {}", output.stdout);
     }
     let html = fs::read_to_string(folder.path().join("out/report.html")).unwrap();

@@ -4,7 +4,7 @@ mod temporary;
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use temporary::remove_abandoned;
@@ -40,6 +40,61 @@ pub fn prepare_folder(path: &Path) -> Result<()> {
         file.sync_all()
     };
     prepare().map_err(|source| Error::write(path, source))
+}
+
+/// A file that is written over time and appears once it is finished; dropped before, it leaves nothing.
+#[derive(Debug)]
+pub struct AtomicFile {
+    target: PathBuf,
+    temporary: Temporary,
+    writer: BufWriter<File>,
+}
+
+impl AtomicFile {
+    /// Begins to write; missing folders are created.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if the folder cannot be used, or `path` is something other than a file.
+    pub fn create(path: &Path) -> Result<Self> {
+        let create = || {
+            let target = match fs::metadata(path) {
+                Ok(metadata) if !metadata.is_file() => return Err(io::Error::other("it is not a file")),
+                Ok(_) => path.canonicalize()?,
+                Err(_) => path.to_owned(),
+            };
+            let folder = match target.parent() {
+                Some(folder) if !folder.as_os_str().is_empty() => folder,
+                _ => Path::new("."),
+            };
+            fs::create_dir_all(folder)?;
+            let (temporary, file) = Temporary::create(folder)?;
+            Ok(Self { temporary, writer: BufWriter::with_capacity(1 << 16, file), target })
+        };
+        create().map_err(|source| Error::write(path, source))
+    }
+
+    /// Puts the file in its place.
+    ///
+    /// # Errors
+    /// [`Error::Write`]; an earlier file is then unchanged.
+    pub fn finish(self) -> Result<()> {
+        let Self { target, temporary, writer } = self;
+        let finish = || {
+            writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+            temporary.rename_to(&target)
+        };
+        finish().map_err(|source| Error::write(&target, source))
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.writer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
 }
 
 fn write_or_io_error(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {

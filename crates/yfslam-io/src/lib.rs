@@ -52,7 +52,7 @@ mod timestamp_order;
 pub mod trajectory;
 pub mod write;
 
-pub use atomic_file::{prepare_folder, write_atomically};
+pub use atomic_file::{AtomicFile, prepare_folder, write_atomically};
 pub use bag::Bag;
 pub use boxes::BoxList;
 pub use camera::{CameraSource, detect_camera, load_camera};

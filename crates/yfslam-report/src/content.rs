@@ -25,6 +25,8 @@ pub struct Report<'a> {
     pub version: &'a str,
     /// Command that produces this report again.
     pub command: String,
+    /// The script with the function `yfScene`, which draws the map in three dimensions; empty to leave the map out.
+    pub scene_script: &'a str,
 }
 
 /// The run of one method.
@@ -46,6 +48,10 @@ pub struct MethodReport<'a> {
     pub snapshots: Vec<Snapshot>,
     /// Dense map, if one was made.
     pub dense: Option<DenseMapImages>,
+    /// Landmarks of the final map in the world of the trajectory, with their colours.
+    pub landmarks: Vec<([f32; 3], [u8; 3])>,
+    /// Poses of the keyframes, world from camera.
+    pub keyframes: &'a [StampedPose],
     /// Configuration, as text.
     pub config: String,
 }
@@ -101,8 +107,8 @@ pub struct Snapshot {
     pub frame: usize,
     /// Why this frame is shown, if there is a reason.
     pub note: &'static str,
-    /// The image as PNG.
-    pub png: Vec<u8>,
+    /// The image as JPEG.
+    pub jpeg: Vec<u8>,
     /// Width and height, px.
     pub size: [usize; 2],
     /// Number of static features, and of dynamic features.
@@ -118,7 +124,7 @@ pub struct DenseMapImages {
     pub occupied: usize,
     /// Side of a voxel, m.
     pub resolution_m: f32,
-    /// From above and from a corner: PNG, with width and height, px.
+    /// From above and from a corner: JPEG, with width and height, px.
     pub views: [(Vec<u8>, [usize; 2]); 2],
 }
 

@@ -80,15 +80,17 @@ fn sample(photos: &[String]) -> Result<Vec<Point>> {
     let disc = square.filter(|[u, v]| u * u + v * v <= RADIUS * RADIUS).map(|offset| offset.map(|d| d as i8));
     let mut points: Vec<Point> = disc.map(|offset| Point { offset, views: Default::default() }).collect();
     let per_photo = PATCHES.div_ceil(photos.len().max(1));
-    let mut extractor = OrbExtractor::new(&FeatureConfig { count: 2 * per_photo, ..FeatureConfig::default() });
+    let config = FeatureConfig { count: 2 * per_photo, ..FeatureConfig::default() };
+    let scales: Vec<f32> = (0..config.levels).map(|octave| config.scale_factor.powi(octave as i32)).collect();
+    let mut extractor = OrbExtractor::new(&config);
     let mut features = Features::default();
     let mut random = Pcg32::new(SEED, 0);
     for path in photos {
         let photo = pgm::read(path)?;
         extractor.extract(&photo, &mut features);
-        let levels: Vec<GrayImage> = extractor.scale_factors().iter().map(|&scale| level(&photo, scale)).collect();
+        let levels: Vec<GrayImage> = scales.iter().map(|&scale| level(&photo, scale)).collect();
         let views = |k: &KeyPoint| {
-            let (image, scale) = (&levels[usize::from(k.octave)], extractor.scale_factors()[usize::from(k.octave)]);
+            let (image, scale) = (&levels[usize::from(k.octave)], scales[usize::from(k.octave)]);
             let upright = view(image, scale, k, &points, || 0.0)?;
             Some([upright, view(image, scale, k, &points, || gaussian(&mut random))?])
         };

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::{Args, value_parser};
 
-use super::run::{self, RunArgs};
+use super::run::{self, RunArgs, WatchArgs};
 use crate::input::settings::{MethodArg, describe};
 use crate::ui::command_line::quote;
 use crate::ui::terminal::Terminal;
@@ -16,6 +16,7 @@ Examples:
   yfslam demo
   yfslam demo --frames 60 -o demo
   yfslam demo --methods none,yf --seed 7
+  yfslam demo --view
 
 Files in the output folder:
   report.html        the comparison
@@ -46,14 +47,18 @@ pub struct DemoArgs {
     /// Output folder.
     #[arg(short, long, value_name = "DIR", default_value = "yfslam-out/demo")]
     out: PathBuf,
+    #[command(flatten)]
+    watch: WatchArgs,
 }
 
 pub fn run(args: &DemoArgs, terminal: Terminal) -> Result<()> {
     // Four people cover half of the image, as in the most crowded recordings.
     let spec = format!("synth:walking_xyz?people=4&share=0.5&frames={}&seed={}", args.frames, args.seed);
     let methods: Vec<&str> = args.methods.iter().map(|m| describe(m.method()).0).collect();
+    let watch = args.watch.arguments().into_iter().map(OsString::from);
     let arguments = [&spec, "--method", &methods.join(","), "--report", "--out"];
-    let arguments: Vec<OsString> = arguments.into_iter().map(OsString::from).chain([args.out.clone().into()]).collect();
+    let arguments: Vec<OsString> =
+        arguments.into_iter().map(OsString::from).chain([args.out.clone().into()]).chain(watch).collect();
     let quoted: Vec<String> = arguments.iter().map(|argument| quote(&argument.to_string_lossy())).collect();
     terminal.note(&format!("this is `yfslam run {}`", quoted.join(" ")));
     run::run(&RunArgs::parse(&arguments)?, terminal)

@@ -13,9 +13,6 @@ pub const BOX: Color = [255, 220, 0];
 /// A box whose score keeps a track but does not open one.
 pub const WEAK_BOX: Color = [140, 120, 0];
 
-/// The colours of all marks.
-pub const MARKS: [Color; 5] = [STATIC, UNMATCHED, DYNAMIC, BOX, WEAK_BOX];
-
 /// Colour of free space in octrees.
 pub const FREE: [u8; 3] = [255; 3];
 /// Colour of voxels without a class.

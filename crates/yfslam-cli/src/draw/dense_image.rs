@@ -7,6 +7,9 @@ use nalgebra::{Point3, Vector3};
 use yfslam::dense::CloudPoint;
 use yfslam::{Image, RgbImage};
 
+use super::shapes::bar;
+use super::text::{label, line_height};
+
 /// Height above the floor above which images leave points out, m.
 pub const SHOWN_M: f32 = 1.9;
 /// Colour of the background.
@@ -49,20 +52,36 @@ impl Canvas {
     }
 }
 
-/// Draws the map from above, as large as possible: x up, y to the left, in the direction of the first image.
+/// Draws the map from above, as large as possible, like the occupancy grid: x to the right, in the direction of the first image, and y up. A bar of
+/// 1 m, or of a power of ten that suits, is the scale.
 pub fn from_above(points: &[CloudPoint], resolution_m: f32, cut_m: f32, [width, height]: [usize; 2]) -> RgbImage {
     let shown = || points.iter().filter(|p| p.position_m[2] < cut_m);
     let mut canvas = Canvas::new(width, height);
     let Some((low, high)) = bounds(shown()) else { return canvas.image };
-    let (wide, deep) = (high.y - low.y + 2.0 * MARGIN_M, high.x - low.x + 2.0 * MARGIN_M);
+    let (wide, deep) = (high.x - low.x + 2.0 * MARGIN_M, high.y - low.y + 2.0 * MARGIN_M);
     let scale = (width as f32 / wide).min(height as f32 / deep);
     let middle = nalgebra::center(&low, &high);
     for p in shown() {
         let [x, y, z] = p.position_m;
-        let at = [width as f32 / 2.0 - (y - middle.y) * scale, height as f32 / 2.0 - (x - middle.x) * scale];
+        let at = [width as f32 / 2.0 + (x - middle.x) * scale, height as f32 / 2.0 - (y - middle.y) * scale];
         canvas.square(at, 1.3 * resolution_m * scale, -z, shaded(p, low.z, high.z));
     }
+    scale_bar(&mut canvas.image, scale);
     canvas.image
+}
+
+/// Draws a bar whose length is a power of ten, up to a third of the width.
+fn scale_bar(image: &mut RgbImage, px_per_m: f32) {
+    const INK: [u8; 3] = [40, 40, 40];
+    let longest_m = image.width() as f32 / px_per_m / 3.0;
+    if !(1e-6..1e9).contains(&longest_m) {
+        return;
+    }
+    let length_m = 10f32.powf(longest_m.log10().floor());
+    let (height, length_px) = (image.height() as i64, (length_m * px_per_m).round() as i64);
+    let text = if length_m < 1.0 { format!("{length_m} m") } else { format!("{length_m:.0} m") };
+    label(image, [8, height - 10 - line_height(image)], &text, INK, PAPER);
+    bar(image, [8, height - 9], [8 + length_px - 1, height - 6], INK);
 }
 
 /// Draws the map from behind and above the first camera.
@@ -121,9 +140,9 @@ mod tests {
             point([2.0, 1.0, 0.0], blue),
             point([2.0, 1.0, 2.6], white),
         ];
-        // 2.4 m up and 1.4 m across at 100 px a metre; x is up, y to the left.
-        let image = from_above(&points, 0.1, 2.0, [140, 240]);
-        let at = |x: f32, y: f32| image.row(((2.2 - x) * 100.0) as usize)[((1.2 - y) * 100.0) as usize];
+        // 2.4 m across and 1.4 m up at 100 px a metre; x is to the right, y up.
+        let image = from_above(&points, 0.1, 2.0, [240, 140]);
+        let at = |x: f32, y: f32| image.row(((1.2 - y) * 100.0) as usize)[((x + 0.2) * 100.0) as usize];
         assert!(at(0.0, 0.0)[0] > 150 && at(0.0, 0.0)[2] == 0);
         assert!(at(2.0, 1.0)[2] > 150 && at(2.0, 1.0)[0] == 0);
         assert_eq!(at(1.0, 0.5), PAPER);

@@ -1,7 +1,8 @@
 //! Drawing on images, and encoding them.
 
+pub mod animated_png;
 pub mod colors;
 pub mod dense_image;
-pub mod indexed_png;
 pub mod shapes;
 pub mod shrink;
+pub mod text;

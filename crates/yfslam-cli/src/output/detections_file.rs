@@ -10,6 +10,7 @@ use yfslam_io::write_atomically;
 
 use super::rle::Rle;
 use crate::draw::shapes::{Color, bar, rectangle, stain};
+use crate::draw::text::{label, line_height};
 use crate::input::detector::ModelIdentity;
 
 /// Colours of the classes, in their order; they repeat.
@@ -158,6 +159,10 @@ impl DetectionsFile<'_> {
             rectangle(&mut drawn, [left, top], [right - 1, bottom - 1], line, color);
             let length = (f64::from(*score) * (right - left) as f64) as i64;
             bar(&mut drawn, [left, top], [left + length - 1, top + 3 * line], color);
+            // Above the box, or inside where there is no room.
+            let above = top - line_height(&drawn);
+            let top = if above >= 0 { above } else { top + 3 * line + 1 };
+            label(&mut drawn, [left, top], &format!("{class} {score:.2}"), color, [0; 3]);
         }
         drawn
     }

@@ -47,6 +47,7 @@ fn page(runs: &[ReportedRun], shared: &Stages) -> Result<String> {
         processor_time: processor_time(runs),
         version: env!("CARGO_PKG_VERSION"),
         command: command_line(),
+        scene_script: yfslam_view::SCENE_SCRIPT,
     };
     Ok(report.html())
 }
@@ -70,6 +71,8 @@ fn method<'a>(run: &ReportedRun<'a>, trajectory: &'a [StampedPose]) -> Result<Me
         times: Times { stages: stages(&outcome.stages), tracking_s: outcome.stages.total("frame").as_secs_f64() },
         snapshots: images.snapshots.clone(),
         dense: images.dense.clone(),
+        landmarks: outcome.landmarks.iter().map(|point| (point.position_m, point.color)).collect(),
+        keyframes: &outcome.keyframes,
         config: config.to_commented_toml()?,
     })
 }

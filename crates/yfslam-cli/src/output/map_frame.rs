@@ -56,7 +56,7 @@ pub fn write(folder: &Path, frame: &MapFrame) -> Result<()> {
 }
 
 fn rows(frame: &MapFrame) -> [[f64; 4]; 4] {
-    let matrix = frame.matrix();
+    let matrix = frame.r_map_world.to_homogeneous();
     // Adding 0 makes a negative zero positive.
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)] + 0.0))
 }

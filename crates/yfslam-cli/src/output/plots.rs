@@ -26,6 +26,8 @@ pub fn figures(sequence: &str, truth: &[StampedPose], estimates: &[Plotted<'_>])
         times: Times::default(),
         snapshots: Vec::new(),
         dense: None,
+        landmarks: Vec::new(),
+        keyframes: &[],
         config: String::new(),
     });
     let report = Report {
@@ -39,6 +41,7 @@ pub fn figures(sequence: &str, truth: &[StampedPose], estimates: &[Plotted<'_>])
         processor_time: None,
         version: env!("CARGO_PKG_VERSION"),
         command: String::new(),
+        scene_script: "",
     };
     report.figures()
 }

@@ -1,15 +1,18 @@
 //! Images of a few frames for the report: some evenly spread, and the most crowded one.
 //!
-//! In: every frame after tracking. Out: PNG images with features and boxes. The choice depends on the frames and their boxes alone, so
+//! In: every frame after tracking. Out: JPEG images with features and boxes. The choice depends on the frames and their boxes alone, so
 //! that methods on the same frames show the same ones.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use yfslam::{Frame, RgbImage, Slam};
+use yfslam_io::write::encode_jpeg;
 use yfslam_report::Snapshot as ReportSnapshot;
 
 use super::overlay::draw_frame;
-use crate::draw::indexed_png::to_png;
 use crate::draw::shrink::shrink;
+
+/// Quality of the images.
+const QUALITY: u8 = 85;
 
 /// Collects snapshots while frames are tracked.
 pub struct Snapshots {
@@ -54,7 +57,7 @@ impl Snapshots {
     /// Returns the images in order of time.
     ///
     /// # Errors
-    /// An image is too large for PNG.
+    /// An image is too large for JPEG.
     pub fn to_images(&self) -> Result<Vec<ReportSnapshot>> {
         let crowded = self.crowded.as_ref().map(|(_, snapshot)| snapshot);
         let mut snapshots: Vec<&Snapshot> = self.taken.iter().collect();
@@ -77,7 +80,8 @@ impl Snapshot {
     fn encode(&self, note: &'static str) -> Result<ReportSnapshot> {
         let Self { frame, image, features } = self;
         let size = [image.width(), image.height()];
-        Ok(ReportSnapshot { frame: *frame, note, png: to_png(image)?, size, features: *features })
+        let jpeg = encode_jpeg(image, QUALITY).context("a snapshot is too large for JPEG")?;
+        Ok(ReportSnapshot { frame: *frame, note, jpeg, size, features: *features })
     }
 }
 

@@ -75,10 +75,11 @@ pub fn of_one(report: &RunReport, run: &ReportedRun) -> Result<String> {
 
 fn write_recognition(text: &mut String, recognition: &RecognitionTally) -> Result<()> {
     match &recognition.loaded_map {
-        Some(LoadedMap { file, recognised: None }) => writeln!(text, "{file} was not recognised")?,
+        Some(LoadedMap { file, recognised: None, .. }) => writeln!(text, "{file} was not recognised")?,
         Some(LoadedMap {
             file,
             recognised: Some(Recognition { timestamp_ns, after_frames, position_m: [x, y, z] }),
+            ..
         }) => {
             let time = format_stamp(*timestamp_ns);
             writeln!(
@@ -121,14 +122,13 @@ pub fn of_several(runs: &[ReportedRun], truth: Option<&Truth>) -> String {
     let kind =
         results.iter().find_map(|result| result.evaluation()).map_or(AlignmentKind::Se3, |e| e.ate.alignment.kind);
     let ate = format!("ATE, {kind} (m)");
-    let headers =
-        [ate.as_str(), "RMSE", "S.D.", "mean", "median", "max", "improve RMSE (%)", "S.D. (%)", "frames tracked"];
+    let headers = [ate.as_str(), "RMSE", "S.D.", "mean", "median", "max", "less RMSE (%)", "less S.D. (%)", "tracked"];
     let mut table = Table::new(headers);
     let errors_of = |result: &RunResult| result.evaluation().map(|e| e.ate.translation_m);
     let original = results.first().and_then(|result| errors_of(result));
     for (index, result) in results.iter().enumerate() {
         let RunResult { config, outcome, .. } = result;
-        let (name, summary) = describe(config.dynamic.method);
+        let (name, _) = describe(config.dynamic.method);
         let errors = errors_of(result);
         let figures = match errors {
             Some(s) => [s.rmse, s.std, s.mean, s.median, s.max].map(|v| format!("{v:.4}")),
@@ -143,7 +143,7 @@ pub fn of_several(runs: &[ReportedRun], truth: Option<&Truth>) -> String {
             _ => Default::default(),
         };
         let tracked = format!("{} of {}", outcome.frames.tracked, outcome.frames.total());
-        table.push([format!("{name}: {summary}")].into_iter().chain(figures).chain(improvement).chain([tracked]));
+        table.push([name.to_owned()].into_iter().chain(figures).chain(improvement).chain([tracked]));
     }
     let boxes = results.iter().map(|result| result.boxes).find(|boxes| !matches!(boxes, BoxOrigin::None));
     let truth = truth.map_or("none", |truth| truth.origin.as_str());

@@ -85,7 +85,7 @@ impl MethodRun {
         let slam = map.build(builder, makes_dense_map)?;
         let mut pipeline = Pipeline::new(slam, map.execution() == Execution::Inline, times);
         if let Some(file) = &map.load_map {
-            pipeline = pipeline.with_loaded_map(file);
+            pipeline = pipeline.with_loaded_map(file, !map.localise);
         }
         Ok(Self { config, pipeline, makes_dense_map, state: TrackingState::default() })
     }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use yfslam::config::DepthSource;
-use yfslam::{Config, Frame, MapFrame, MapUse, Pose, Slam, Tracked, TrackingState};
+use yfslam::{Config, Frame, MapFrame, Pose, Slam, Tracked, TrackingState};
 use yfslam_io::StampedPose;
 use yfslam_io::time::format_stamp;
 use yfslam_io::write::PlyPoint;
@@ -38,10 +38,14 @@ pub struct Pipeline {
     detector_times: Option<Receiver<DetectorTime>>,
     parts: Parts,
     maps_inline: bool,
+    /// The map frame of the dense map, once that is taken.
+    map_frame: Option<MapFrame>,
     started: Instant,
     state: TrackingState,
     /// Largest number of features, and of static features with depth, in a frame before initialisation.
     best_start: (usize, usize),
+    /// The result of the last frame; `None` if it was refused.
+    last: Option<Tracked>,
 }
 
 /// The results of a run.
@@ -83,21 +87,25 @@ impl Pipeline {
             detector_times,
             parts: Parts::default(),
             maps_inline,
+            map_frame: None,
             started: Instant::now(),
             state: TrackingState::default(),
             best_start: (0, 0),
+            last: None,
         }
     }
 
-    /// Notes that the system has begun with the map in `file`.
+    /// Notes that the system has begun with the map in `file`, which it extends or only localises in.
     #[must_use]
-    pub fn with_loaded_map(mut self, file: &Path) -> Self {
-        self.recognition.loaded_map = Some(LoadedMap { file: file.display().to_string(), recognised: None });
+    pub fn with_loaded_map(mut self, file: &Path, is_extended: bool) -> Self {
+        let file = file.display().to_string();
+        self.recognition.loaded_map = Some(LoadedMap { file, is_extended, recognised: None });
         self
     }
 
     /// Tracks one frame and returns the state after it; a frame that SLAM refuses is counted as skipped.
     pub fn track(&mut self, frame: &Frame) -> TrackingState {
+        self.last = None;
         let started = Instant::now();
         let (result, cpu) = cpu::timed(|| self.slam.track(frame));
         let tracked = match result {
@@ -126,7 +134,14 @@ impl Pipeline {
         } else if self.frames.tracked == 0 {
             self.update_best_start();
         }
-        tracked.state
+        let state = tracked.state;
+        self.last = Some(tracked);
+        state
+    }
+
+    /// Returns the result of the last frame; `None` if it was refused.
+    pub fn last(&self) -> Option<&Tracked> {
+        self.last.as_ref()
     }
 
     /// Counts a frame that cannot be used.
@@ -151,7 +166,9 @@ impl Pipeline {
     /// The system makes none, or it cannot be encoded.
     pub fn dense_map(&mut self) -> Result<DenseResult> {
         self.finish_mapping();
-        DenseResult::new(self.slam.dense()?.snapshot())
+        let dense_map = self.slam.dense()?.snapshot();
+        self.map_frame = dense_map.frame;
+        DenseResult::new(dense_map)
     }
 
     /// Returns the counts of frames so far.
@@ -253,7 +270,7 @@ impl Pipeline {
         if self.frames.tracked == 0 {
             self.fail(config)?;
         }
-        let map_frame = self.slam.map_frame();
+        let map_frame = self.map_frame.or(self.slam.statistics().saved_frame).unwrap_or_default();
         let map = self.slam.map();
         let first_keyframe = self.slam.statistics().first_keyframe;
         let new_keyframes = map.keyframes().filter(|(_, k)| k.sequence >= first_keyframe);
@@ -283,15 +300,14 @@ impl Pipeline {
             let Some(first) = first_skipped else { bail!("no trajectory: no frame was read") };
             bail!("no trajectory: none of the {skipped} frames can be used; the first: {first}");
         }
-        if let Some(LoadedMap { file, .. }) = &self.recognition.loaded_map {
-            let begins = match self.slam.map_use() {
-                Some(MapUse::Extend) => {
-                    format!(
-                        ", and a new map is begun only after {} s (tracking.reset_after_s)",
-                        config.tracking.reset_after_s
-                    )
-                }
-                _ => String::new(),
+        if let Some(LoadedMap { file, is_extended, .. }) = &self.recognition.loaded_map {
+            let begins = if *is_extended {
+                format!(
+                    ", and a new map is begun only after {} s (tracking.reset_after_s)",
+                    config.tracking.reset_after_s
+                )
+            } else {
+                String::new()
             };
             bail!(
                 "no trajectory: {file} was not recognised in any of {read} frames ({skipped} skipped){begins}; the recording has to show places of \

@@ -8,6 +8,8 @@ use yfslam::{LoopClosure, Tracked, TrackingStart, TrackingState};
 pub struct LoadedMap {
     /// Its file.
     pub file: String,
+    /// Whether the run extends it; else it is only localised in.
+    pub is_extended: bool,
     /// `None` if no frame shows a place of it, as far as that was recognised.
     pub recognised: Option<Recognition>,
 }

@@ -20,6 +20,7 @@ mod ros1;
 mod sqlite;
 mod topics;
 mod walk;
+pub mod write;
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;

@@ -14,6 +14,14 @@ pub fn check_camera(source: &CameraSource) -> Result<()> {
         let cure = "give the depth units per metre: 5000 for TUM, 1000 for millimetres";
         return refuse(&format!("depth factor is {depth_factor}"), cure);
     }
-    let checked = if source.missing.size { camera.check_without_size() } else { camera.check() };
-    checked.or_else(|error| refuse(&error.problem, error.cure))
+    let mut camera = camera.clone();
+    if source.missing.size {
+        // The size comes with the first image, and is checked then; until then the principal point is taken for the middle.
+        (camera.width, camera.height) = (likely_side(camera.cx), likely_side(camera.cy));
+    }
+    camera.check().or_else(|error| refuse(&error.problem, error.cure))
+}
+
+fn likely_side(centre: f64) -> usize {
+    if (1.0..8000.0).contains(&centre) { (2.0 * centre).ceil() as usize } else { 640 }
 }

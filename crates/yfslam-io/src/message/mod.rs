@@ -7,6 +7,7 @@ mod bayer;
 mod color;
 mod compressed_depth;
 mod depth;
+pub mod encode;
 pub use depth::METRES_UNITS;
 pub mod types;
 pub mod wire;

@@ -1,6 +1,7 @@
 //! The products of a run as files: recordings, point clouds, meshes, octrees, occupancy grids, images.
 
 mod coordinates;
+mod jpeg;
 mod nav2;
 mod octomap;
 mod pcd;
@@ -9,6 +10,7 @@ mod png;
 mod recording;
 
 pub use coordinates::Coordinates;
+pub use jpeg::encode_jpeg;
 pub use nav2::write_nav2;
 pub use octomap::{OctreeFormat, OctreeSize, OctreeVoxel, write_octomap};
 pub use pcd::write_pcd;

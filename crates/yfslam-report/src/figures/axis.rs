@@ -69,12 +69,19 @@ impl Axis {
         Self { name: name.into(), scale: Scale::Log, range: [low, high], ticks }
     }
 
-    /// Returns an axis of angles in degrees on both sides of zero, logarithmic beyond `threshold`, which is a power of ten.
+    /// Returns an axis of angles in degrees on both sides of zero, logarithmic beyond `threshold`, which is a power of ten. Labels are powers of ten,
+    /// and 2 and 5 times these where there would be few.
     pub fn symlog_degrees(name: impl Into<String>, limit: f64, threshold: f64) -> Self {
         let scale = Scale::SymLog(threshold);
         let decades = (limit / threshold).log10().ceil().max(1.0) as i32;
-        let powers = (0..=decades).map(|k| threshold * 10f64.powi(k));
-        let values: Vec<f64> = powers.filter(|v| *v <= limit).collect();
+        let values_of = |factors: &[f64]| -> Vec<f64> {
+            let powers = (0..=decades).map(|k| threshold * 10f64.powi(k));
+            let values = powers.flat_map(|power| factors.iter().map(move |factor| factor * power));
+            // A power of ten that was computed may be a little less than its digits.
+            values.map(|v| (v * 1e9).round() / 1e9).filter(|v| *v <= limit).collect()
+        };
+        let powers = values_of(&[1.0]);
+        let values = if powers.len() < 3 { values_of(&[1.0, 2.0, 5.0]) } else { powers };
         let signed = values.iter().rev().map(|v| -v).chain([0.0]).chain(values.iter().copied());
         let ticks = signed.map(|v| (scale.position(v), format!("{v}").replace('-', "−"))).collect();
         let end = scale.position(limit) + 0.1;
@@ -163,6 +170,8 @@ mod tests {
     fn angles_keep_their_sign_on_a_logarithmic_axis() {
         let axis = Axis::symlog_degrees("", 170.0, 1.0);
         assert_eq!(labels(&axis), ["−100", "−10", "−1", "0", "1", "10", "100"]);
+        let few = Axis::symlog_degrees("", 6.0, 0.1);
+        assert_eq!(labels(&few).split_off(6), ["0", "0.1", "0.2", "0.5", "1", "2", "5"]);
         assert_eq!(axis.scale.position(-10.0), -2.0);
         assert_eq!(axis.scale.position(0.5), 0.5);
     }

@@ -4,7 +4,7 @@ use super::bars::bars;
 use super::ink::Ink;
 use super::over_time::over_time;
 use super::scene::{Captioned, Scene};
-use super::views::views;
+use super::views::{multiples, views};
 use crate::content::Report;
 
 /// A figure in a file of its own.
@@ -30,6 +30,8 @@ impl Report<'_> {
         let with_truth: Vec<(String, Ink)> = truth.into_iter().chain(methods.iter().cloned()).collect();
         let mut files: Vec<FigureFile> =
             views(&scene).into_iter().map(|one| file("trajectory-", one, &with_truth)).collect();
+        let multiples = multiples(&scene);
+        files.extend(multiples.figures.into_iter().map(|one| file("trajectory-error-of-", one, &multiples.legend)));
         files.extend(over_time(&scene).into_iter().map(|one| file("", one, &methods)));
         files.extend(bars(self, &scene).map(|one| file("", one, &methods)));
         files

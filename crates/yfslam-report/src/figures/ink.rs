@@ -21,7 +21,21 @@ pub enum Ink {
     Truth,
     /// A method, by its index in [`METHODS`].
     Method(usize),
+    /// An error, by its step on a scale from 0 to the largest, the index in [`ERRORS`].
+    Error(usize),
 }
+
+/// Light and dark colours of errors, from small to large: from blue over yellow to red, with the lightness going one way.
+const ERRORS: [[Rgb; 2]; 6] = [
+    [[190, 208, 226], [45, 65, 92]],
+    [[128, 186, 204], [47, 110, 138]],
+    [[120, 178, 96], [96, 166, 84]],
+    [[222, 170, 20], [222, 184, 52]],
+    [[220, 96, 22], [244, 132, 60]],
+    [[150, 12, 40], [255, 92, 110]],
+];
+/// Number of steps of the scale of errors.
+pub const ERROR_STEPS: usize = ERRORS.len();
 
 /// Light and dark colours of methods, distinguishable with every kind of colour vision (the first three by luminance, too).
 const METHODS: [[Rgb; 2]; 7] = [
@@ -62,6 +76,7 @@ impl Ink {
             Self::Grid => "--ink-grid".into(),
             Self::Truth => "--ink-truth".into(),
             Self::Method(index) => format!("--ink-method-{index}"),
+            Self::Error(step) => format!("--ink-error-{step}"),
         }
     }
 
@@ -72,11 +87,13 @@ impl Ink {
             Self::Grid => [[229, 231, 235], [44, 51, 61]],
             Self::Truth => [[31, 41, 55], [229, 233, 240]],
             Self::Method(index) => METHODS.get(index).copied().unwrap_or(METHODS[0]),
+            Self::Error(step) => ERRORS[step.min(ERROR_STEPS - 1)],
         }
     }
 
     fn all() -> impl Iterator<Item = Self> {
-        [Self::Text, Self::Axis, Self::Grid, Self::Truth].into_iter().chain((0..METHODS.len()).map(Self::Method))
+        let fixed = [Self::Text, Self::Axis, Self::Grid, Self::Truth].into_iter();
+        fixed.chain((0..METHODS.len()).map(Self::Method)).chain((0..ERROR_STEPS).map(Self::Error))
     }
 }
 

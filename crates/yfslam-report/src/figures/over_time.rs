@@ -47,14 +47,18 @@ fn angle(scene: &Scene, name: &'static str, k: usize) -> Option<Captioned> {
         .filter_map(|m| Some((m.name, m.series.all_errors().map(size).reduce(f64::max)?)))
         .collect();
     let best = each.iter().map(|(_, v)| *v).fold(f64::INFINITY, f64::min).max(1e-6);
+    let mut scale = String::new();
     let axis = if worst / best > LOG_FROM_RATIO {
-        Axis::symlog_degrees("error (°), logarithmic", worst, 10f64.powf(best.log10().ceil()))
+        // Below the smallest of the largest errors, so that there is something of every method in the logarithmic part.
+        let threshold = 10f64.powf(best.log10().floor());
+        scale = format!(" Logarithmic beyond ±{threshold}°.");
+        Axis::symlog_degrees("error (°), logarithmic", worst, threshold)
     } else {
         let limit = worst.max(1e-6) * 1.1;
         Axis::linear("error (°)", [-limit, limit], 4, 1.0)
     };
     let largest: Vec<_> = each.iter().map(|(name, v)| format!("{name} {v:.2}°")).collect();
-    let note = format!("Largest: {}.", largest.join(", "));
+    let note = format!("Largest: {}.{scale}", largest.join(", "));
     Some(figure(scene, name, axis, note, of))
 }
 

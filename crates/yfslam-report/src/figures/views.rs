@@ -2,16 +2,20 @@
 
 use nalgebra::Vector3;
 
-use super::axis::Axis;
-use super::ink::Ink;
+use super::axis::{Axis, length};
+use super::ink::{ERROR_STEPS, Ink};
 use super::path::Point;
 use super::plot::{Figure, Mark, height_for, plot_size};
 use super::scene::{Captioned, Scene, WIDTH, bounds};
-use super::series::At;
+use super::series::{At, ErrorAt};
 
 /// Extent of a view relative to that of the ground truth, beyond which estimates are clipped: otherwise a very large error of one method
 /// would shrink the other trajectories to a dot.
 const ROOM: f64 = 2.5;
+/// Most poses of a part of a trajectory that is drawn in the colours of its error; of more, every n-th is drawn.
+const MAX_SHADED: usize = 1500;
+/// Ratio of the errors of two colours.
+const STEP_FACTOR: f64 = 2.5;
 /// Smallest extent of a view, m.
 const LEAST_M: f64 = 0.02;
 
@@ -34,6 +38,69 @@ pub fn views(scene: &Scene) -> Vec<Captioned> {
     let along = if spread(&first) >= spread(&second) { &first } else { &second };
     let pairs = [("From above", &first, &second), ("From the side", along, &up)];
     pairs.into_iter().filter_map(|(title, x, y)| view(scene, title, x, y)).collect()
+}
+
+/// The trajectory of each method by itself, from above, in the colours of its error; nothing for a single method or without ground truth.
+pub struct Multiples {
+    pub figures: Vec<Captioned>,
+    /// Each colour with the errors that it stands for.
+    pub legend: Vec<(String, Ink)>,
+}
+
+/// Draws each method by itself, since trajectories with small errors cover each other.
+pub fn multiples(scene: &Scene) -> Multiples {
+    let none = || Multiples { figures: Vec::new(), legend: Vec::new() };
+    let errors =
+        || scene.methods.iter().filter_map(|m| m.series.all_errors().map(|e| e.translation_m).reduce(f64::max));
+    let worst: Vec<f64> = errors().collect();
+    let Some(largest) = worst.iter().copied().reduce(f64::max).filter(|largest| worst.len() > 1 && *largest > 0.0)
+    else {
+        return none();
+    };
+    // Each step is a factor: the methods often differ by more than ten times.
+    let limit = |step: usize| largest / STEP_FACTOR.powi((ERROR_STEPS - 1 - step) as i32);
+    let step_of = |error_m: f64| (0..ERROR_STEPS - 1).find(|step| error_m <= limit(*step)).unwrap_or(ERROR_STEPS - 1);
+    let [x, y, _] = directions(scene);
+    let figures = scene.methods.iter().enumerate().filter(|(_, method)| !method.series.errors.is_empty());
+    let figures = figures.filter_map(|(index, method)| {
+        let mut captioned = view(scene, method.name, &x, &y)?;
+        let flat = |at: &At| [x.of(at), y.of(at)];
+        captioned.figure.marks = shaded(scene, index, &flat, &step_of);
+        captioned.figure.description = format!("{} from above, in the colours of its error", method.name);
+        Some(captioned)
+    });
+    let figures = figures.collect();
+    let legend = (0..ERROR_STEPS).map(|step| (format!("≤ {}", length(limit(step))), Ink::Error(step)));
+    Multiples { figures, legend: legend.collect() }
+}
+
+/// Returns the ground truth, and the trajectory of a method in lines of one step of the error each.
+fn shaded(scene: &Scene, index: usize, flat: &impl Fn(&At) -> Point, step_of: &impl Fn(f64) -> usize) -> Vec<Mark> {
+    let truth = scene.truth.iter().map(|truth| Mark::Line {
+        points: truth.iter().map(flat).collect(),
+        ink: Ink::Axis,
+        width: 1.0,
+        opacity: 1.0,
+    });
+    let mut marks: Vec<Mark> = truth.collect();
+    let Some(method) = scene.methods.get(index) else { return marks };
+    let errors: Vec<&ErrorAt> = method.series.all_errors().collect();
+    for part in &method.series.track {
+        let mut line: (Vec<Point>, usize) = (Vec::new(), 0);
+        for at in part.iter().step_by(part.len().div_ceil(MAX_SHADED).max(1)) {
+            // The errors are in order of time, and one may be missing.
+            let next = errors.partition_point(|error| error.time_s < at.time_s - 1e-6);
+            let step = errors.get(next).map_or(line.1, |error| step_of(error.translation_m));
+            line.0.push(flat(at));
+            if step != line.1 {
+                let points = std::mem::replace(&mut line.0, vec![flat(at)]);
+                marks.push(Mark::Line { points, ink: Ink::Error(line.1), width: 2.6, opacity: 1.0 });
+                line.1 = step;
+            }
+        }
+        marks.push(Mark::Line { points: line.0, ink: Ink::Error(line.1), width: 2.6, opacity: 1.0 });
+    }
+    marks
 }
 
 fn view(scene: &Scene, title: &str, x: &Direction, y: &Direction) -> Option<Captioned> {

@@ -17,7 +17,7 @@ pub fn dense(report: &Report) -> Markup {
     html! {
         section #dense {
             h2 { "Dense map" }
-            p.about { "Occupied voxels in their colours, from above and from a corner; points high above the floor are left out." }
+            p.about { "Occupied voxels in their colours, from above (x to the right, y up, as in the occupancy grid) and from a corner; points high above the floor are left out." }
             div.images.grid[one] {
                 div.snapshot { @for (index, method, map) in &maps { (view(method, *index, map, 0)) } }
                 div.snapshot { @for (index, method, map) in &maps { (view(method, *index, map, 1)) } }
@@ -27,13 +27,13 @@ pub fn dense(report: &Report) -> Markup {
 }
 
 fn view(method: &MethodReport, index: usize, map: &DenseMapImages, which: usize) -> Markup {
-    let (png, [width, height]) = &map.views[which];
+    let (jpeg, [width, height]) = &map.views[which];
     let color = format!("color:var({})", Ink::method(method.name, index).variable());
     let from = ["from above", "from a corner"][which];
     html! {
         figure {
             img width=(width) height=(height) alt=(format!("the map of {} {from}", method.name))
-                src=(format!("data:image/png;base64,{}", STANDARD.encode(png)));
+                src=(format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg)));
             figcaption {
                 b style=(color) { (method.name) } " " (from)
                 @if which == 0 {

@@ -1,6 +1,7 @@
 //! HTML pages.
 
 mod dense;
+mod map3d;
 mod page;
 mod tables;
 pub mod tables_page;

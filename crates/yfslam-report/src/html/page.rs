@@ -5,6 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::dense::dense;
+use super::map3d::map3d;
 use super::tables;
 use crate::content::{MethodReport, Report, Snapshot};
 use crate::figures::axis::length;
@@ -12,7 +13,8 @@ use crate::figures::bars::bars;
 use crate::figures::ink::{self, Ink};
 use crate::figures::over_time::over_time;
 use crate::figures::scene::{Captioned, Scene};
-use crate::figures::views::views;
+use crate::figures::views::{multiples, views};
+
 use yfslam_eval::{AlignmentKind, improvement_percent};
 
 /// Style sheet of all pages.
@@ -32,6 +34,7 @@ fn page(report: &Report) -> Markup {
         (header(report))
         (accuracy(report, &scene))
         (trajectory(&scene))
+        (map3d(report))
         (errors(report, &scene))
         (snapshots(report))
         (dense(report))
@@ -182,6 +185,30 @@ fn trajectory(scene: &Scene) -> Markup {
                 @if scene.any_lost() { " A cross is where tracking was lost; the faint line leads to where it resumed." }
             }
             div.pair { @for view in views(scene) { (figure(scene, &view, true)) } }
+            (each_alone(scene))
+        }
+    }
+}
+
+/// The trajectory of each method by itself, because small errors are hidden where trajectories cover each other.
+fn each_alone(scene: &Scene) -> Markup {
+    let multiples = multiples(scene);
+    html! {
+        @if !multiples.figures.is_empty() {
+            h3 { "Each method by itself, from above" }
+            p.about {
+                "In the colours of the error: "
+                span.legend { @for (name, ink) in &multiples.legend { (key(name, *ink)) } span { i style="background:var(--ink-axis)" {} "ground truth" } }
+            }
+            div.pair {
+                @for one in &multiples.figures {
+                    figure {
+                        figcaption { b { (one.title) } }
+                        (PreEscaped(one.figure.svg()))
+                        @if !one.note.is_empty() { p.note { (one.note) } }
+                    }
+                }
+            }
         }
     }
 }
@@ -250,7 +277,7 @@ fn snapshots(report: &Report) -> Markup {
             }
             div.images.grid[one] {
                 @for frame in frames {
-                    div.snapshot {
+                    div.snapshot.two[report.methods.len().is_multiple_of(2)] {
                         @for (index, method) in report.methods.iter().enumerate() {
                             @if let Some(snapshot) = method.snapshots.iter().find(|p| p.frame == frame) {
                                 (show_snapshot(method, index, snapshot))
@@ -270,7 +297,7 @@ fn show_snapshot(method: &MethodReport, index: usize, snapshot: &Snapshot) -> Ma
     html! {
         figure {
             img width=(width) height=(height) alt=(format!("frame {} under {}", snapshot.frame, method.name))
-                src=(format!("data:image/png;base64,{}", STANDARD.encode(&snapshot.png)));
+                src=(format!("data:image/jpeg;base64,{}", STANDARD.encode(&snapshot.jpeg)));
             figcaption {
                 b style=(color) { (method.name) }
                 " frame " (snapshot.frame) @if !snapshot.note.is_empty() { ", " (snapshot.note) }

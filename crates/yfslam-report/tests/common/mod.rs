@@ -32,7 +32,7 @@ pub fn method<'a>(
     let stage = |name: &str, ms: f64| Stage { name: name.into(), count: 9, median_ms: ms, p99_ms: 3.0 * ms };
     let times = Times { stages: vec![stage("features", 1.5), stage("mapping", 12.0)], tracking_s: 2.5 };
     let frames = Frames { total: trajectory.len() + 90, tracked: trajectory.len(), lost: 90, skipped: Vec::new() };
-    let snapshot = Snapshot { frame: 3, note: "", png: vec![0; 9], size: [4, 3], features: [8, 1] };
+    let snapshot = Snapshot { frame: 3, note: "", jpeg: vec![0; 9], size: [4, 3], features: [8, 1] };
     let config = "seed = 0 # <&>\n".into();
     MethodReport {
         name,
@@ -43,6 +43,8 @@ pub fn method<'a>(
         times,
         snapshots: vec![snapshot],
         dense: None,
+        landmarks: vec![([0.5, -1.0, 2.0], [9, 8, 7])],
+        keyframes: trajectory.get(..2).unwrap_or(&[]),
         config,
     }
 }
@@ -63,5 +65,6 @@ pub fn report<'a>(
         processor_time: None,
         version: "0",
         command: String::new(),
+        scene_script: "function yfScene() {}",
     }
 }

@@ -45,7 +45,7 @@ impl Camera {
                 return refuse(format!("{name} is {side}"), "give the size of the images in pixels");
             }
         }
-        self.check_values(true)?;
+        self.check_values()?;
         check_distortion(self).or_else(|(u, v)| {
             let rational = if self.rational == [0.0; 3] { String::new() } else { format!(" with {:?}", self.rational) };
             let problem =
@@ -54,15 +54,7 @@ impl Camera {
         })
     }
 
-    /// Checks a calibration of which `width` and `height` are not known yet.
-    ///
-    /// # Errors
-    /// As [`Camera::check`].
-    pub fn check_without_size(&self) -> Result<(), CameraError> {
-        self.check_values(false)
-    }
-
-    fn check_values(&self, has_size: bool) -> Result<(), CameraError> {
+    fn check_values(&self) -> Result<(), CameraError> {
         let positive = [
             ("fx", self.fx, "give the focal length in pixels"),
             ("fy", self.fy, "give the focal length in pixels"),
@@ -74,7 +66,7 @@ impl Camera {
                 return refuse(format!("{name} is {value}"), cure);
             }
         }
-        if let Some((problem, cure)) = implausible(self, has_size) {
+        if let Some((problem, cure)) = implausible(self) {
             return refuse(problem, cure);
         }
         let Self { readout_ms, depth_readout_ms, depth_delay_ms, .. } = *self;
@@ -102,7 +94,7 @@ fn refuse(problem: String, cure: &'static str) -> Result<(), CameraError> {
 }
 
 /// Returns what no camera of this size has, and what to do.
-fn implausible(camera: &Camera, has_size: bool) -> Option<(String, &'static str)> {
+fn implausible(camera: &Camera) -> Option<(String, &'static str)> {
     let Camera { fx, fy, cx, cy, fps, bf, .. } = *camera;
     let (width, height) = (camera.width as f64, camera.height as f64);
     if !(1.0 / MAX_ASPECT..=MAX_ASPECT).contains(&(fx / fy)) {
@@ -114,9 +106,6 @@ fn implausible(camera: &Camera, has_size: bool) -> Option<(String, &'static str)
     }
     if !FPS.contains(&fps) {
         return Some((format!("fps is {fps}"), "give the frames per second, such as 30"));
-    }
-    if !has_size {
-        return None;
     }
     let longer = width.max(height);
     for (name, focal) in [("fx", fx), ("fy", fy)] {

@@ -1,9 +1,10 @@
 //! The map frame: the axes in which everything that is made of a map is written.
 
-use nalgebra::{Isometry3, Matrix4, Quaternion, Translation3, UnitQuaternion};
+#[cfg(feature = "persist")]
+use nalgebra::Quaternion;
+use nalgebra::UnitQuaternion;
 
 use crate::dense::{DenseMap, Up, gravity};
-use crate::geometry::Pose;
 #[cfg(feature = "persist")]
 use crate::map::container::{ContainerError, FRAME, PackedSection};
 
@@ -17,28 +18,20 @@ pub struct MapFrame {
     pub up: Up,
 }
 
-impl MapFrame {
+impl Default for MapFrame {
     /// Returns the frame of a map whose first image was upright.
-    pub fn of_camera() -> Self {
+    fn default() -> Self {
         Self { r_map_world: gravity::of_camera(), up: Up::Camera }
     }
+}
 
+impl MapFrame {
     /// Returns the frame whose z-axis is perpendicular to the level surfaces of a dense map; that of the camera if it is empty.
-    pub fn of_dense_map(dense_map: &DenseMap) -> Self {
+    pub(crate) fn of_dense_map(dense_map: &DenseMap) -> Self {
         if dense_map.patches.is_empty() {
-            return Self::of_camera();
+            return Self::default();
         }
         Self { r_map_world: dense_map.turn(Up::Level), up: Up::Level }
-    }
-
-    /// Returns the transformation of points of the world of the keyframes into this frame.
-    pub fn t_map_world(&self) -> Pose {
-        Isometry3::from_parts(Translation3::identity(), self.r_map_world)
-    }
-
-    /// Returns the same as a homogeneous matrix.
-    pub fn matrix(&self) -> Matrix4<f64> {
-        self.t_map_world().to_homogeneous()
     }
 
     /// Returns the section of a saved map.

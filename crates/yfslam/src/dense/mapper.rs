@@ -267,7 +267,7 @@ mod tests {
     }
 
     fn mapper(execution: Execution) -> DenseMapper {
-        DenseMapper::new(&DenseConfig::default(), &scene::camera(), execution, &MapFrame::of_camera()).unwrap()
+        DenseMapper::new(&DenseConfig::default(), &scene::camera(), execution, &MapFrame::default()).unwrap()
     }
 
     #[test]
@@ -387,7 +387,7 @@ mod tests {
         let error = mapper(Execution::Inline).with_earlier(dense_map.clone(), &Map::default()).err().unwrap();
         assert!(error.to_string().contains("keyframe 2"), "{error}");
         let other = DenseConfig { stride_px: 4, ..Default::default() };
-        let other = DenseMapper::new(&other, &scene::camera(), Execution::Inline, &MapFrame::of_camera()).unwrap();
+        let other = DenseMapper::new(&other, &scene::camera(), Execution::Inline, &MapFrame::default()).unwrap();
         let error = other.with_earlier(dense_map, &map).err().unwrap().to_string();
         assert!(error.contains("cells of 2 px") && error.contains("dense.stride_px = 2"), "{error}");
     }

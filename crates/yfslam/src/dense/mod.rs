@@ -122,7 +122,7 @@ pub struct DenseMap {
     pub unmerged: Vec<(usize, PlacedPatch)>,
     /// Names of the classes of cells, from class 1 on; empty if no detector searched for static objects.
     pub class_names: Vec<String>,
-    /// The map frame, once it is fixed.
+    /// The map frame; `None` in files of programs that did not know it.
     pub frame: Option<MapFrame>,
 }
 
@@ -175,11 +175,6 @@ impl DenseMap {
             class_names: Vec::new(),
             frame: None,
         }
-    }
-
-    /// Returns the map frame: the one that was saved with the map, else the one of its level surfaces.
-    pub fn frame(&self) -> MapFrame {
-        self.frame.unwrap_or_else(|| MapFrame::of_dense_map(self))
     }
 
     /// Returns the rotation after which the z-axis of the world points up.

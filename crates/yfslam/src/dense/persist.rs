@@ -167,7 +167,7 @@ mod tests {
         patches[2].patch.depth.iter_mut().for_each(|d| *d |= 1 << 15);
         patches[0].patch = patches[0].patch.clone().with_classes(&grid, |[x, _]| u8::from(x < 20.0) * 2);
         let class_names = vec!["chair".to_owned(), "tv".to_owned()];
-        let frame = Some(MapFrame::of_camera());
+        let frame = Some(MapFrame::default());
         DenseMap { patches, unmerged: vec![(1, patch(7))], grid, class_names, frame }
     }
 

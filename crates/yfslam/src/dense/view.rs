@@ -9,7 +9,7 @@ use super::{DenseMap, DenseMapper, MapFrame, Volume};
 use crate::map::Map;
 
 /// The present dense map of the submap that has most keyframe patches, in the map frame of the saved map that the session continues, else in
-/// that of an upright first image ([`MapFrame::of_camera`]). With [`Execution::Threaded`](crate::Execution::Threaded) each call waits until all patches are
+/// that of an upright first image ([`MapFrame::default`]). With [`Execution::Threaded`](crate::Execution::Threaded) each call waits until all patches are
 /// integrated.
 pub struct DenseView<'a> {
     mapper: &'a mut DenseMapper,

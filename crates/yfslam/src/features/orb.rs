@@ -68,7 +68,7 @@ impl OrbExtractor {
     }
 
     /// Returns the scale of each pyramid level relative to the full image, finest (1) first.
-    pub fn scale_factors(&self) -> &[f32] {
+    pub(crate) fn scale_factors(&self) -> &[f32] {
         &self.scale_factors
     }
 

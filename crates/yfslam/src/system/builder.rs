@@ -123,7 +123,7 @@ impl SlamBuilder {
         let detector = detector.filter(|_| needs_boxes);
         let detections = FrameDetections::new(&config.dynamic, detector.as_deref())?;
         let earlier = earlier.filter(|_| map_use == Some(MapUse::Extend));
-        let frame = saved_frame.unwrap_or_else(MapFrame::of_camera);
+        let frame = saved_frame.unwrap_or_default();
         let mut dense = dense_mapper(dense, &context, execution, &frame, earlier, &map)?;
         if let Some(dense) = dense.as_mut().filter(|_| detections.detects_static_classes()) {
             dense.name_classes(&detections.class_names);

@@ -1,7 +1,7 @@
 //! What can be asked of the system between frames.
 
-use super::{MapUse, Readout, Slam};
-use crate::dense::{DenseError, DenseMapper, DenseView, MapFrame};
+use super::{Readout, Slam};
+use crate::dense::{DenseError, DenseView, MapFrame};
 use crate::detect::Detection;
 use crate::dynamic::Region;
 use crate::features::Feature;
@@ -31,6 +31,8 @@ pub struct Statistics {
     pub first_keyframe: u64,
     /// Whether mapping on its own thread has ended by a panic, so that the map can no longer grow.
     pub mapping_has_ended: bool,
+    /// The map frame of the saved map that the session continues.
+    pub saved_frame: Option<MapFrame>,
     /// How the readout time of the rows of an image is known.
     pub readout: Readout,
     /// Keyframe patches of the dense map.
@@ -48,15 +50,11 @@ impl Slam {
         self.owner.finish()?.loop_closure
     }
 
-    /// Returns how the map of an earlier session is used; `None` if there is none.
-    pub fn map_use(&self) -> Option<MapUse> {
-        self.map_use
-    }
-
     /// Returns the counts of this session.
     pub fn statistics(&self) -> Statistics {
         let mut statistics = self.statistics;
         statistics.first_keyframe = self.first_keyframe;
+        statistics.saved_frame = self.saved_frame;
         statistics.readout = self.readout;
         statistics.mapping_has_ended = !self.owner.is_alive();
         if let Some(dense) = &self.dense {
@@ -132,7 +130,7 @@ impl Slam {
     pub fn save_map(&mut self) -> Result<Vec<u8>, MapError> {
         let mut bytes = match &mut self.dense {
             Some(dense) => DenseView::new(dense, self.owner.map(), self.saved_frame).snapshot().to_bytes()?,
-            None => self.map_frame().to_bytes()?,
+            None => self.saved_frame.unwrap_or_default().to_bytes()?,
         };
         bytes.extend(encode(self.map(), &self.context.sensor.camera, &self.context.config.features)?);
         Ok(bytes)
@@ -145,13 +143,5 @@ impl Slam {
     pub fn dense(&mut self) -> Result<DenseView<'_>, DenseError> {
         let mapper = self.dense.as_mut().ok_or(DenseError::Disabled)?;
         Ok(DenseView::new(mapper, self.owner.map(), self.saved_frame))
-    }
-
-    /// Returns the map frame: that of the saved map that the session continues, else the one that a map saved now would get, from the level
-    /// surfaces of the dense map or, without one, from an upright first image.
-    pub fn map_frame(&mut self) -> MapFrame {
-        let (saved, dense) = (self.saved_frame, &mut self.dense);
-        let of_dense = |dense: &mut DenseMapper| MapFrame::of_dense_map(&dense.snapshot(self.owner.map()));
-        saved.or_else(|| dense.as_mut().map(of_dense)).unwrap_or_else(MapFrame::of_camera)
     }
 }

@@ -43,9 +43,4 @@ impl SavedMap {
     pub fn dense(&self) -> Option<&DenseMap> {
         self.dense.as_ref()
     }
-
-    /// Returns the map frame; `None` in files of programs that did not know it.
-    pub fn frame(&self) -> Option<MapFrame> {
-        self.frame
-    }
 }

@@ -49,8 +49,8 @@ impl Exporter<'_> {
     /// Writes the transformation into the frame of the products, and the path of the camera in it.
     pub fn frame(&self) -> Result<String> {
         map_frame::write(&self.folder, &self.frame)?;
-        let t_map_world = self.frame.t_map_world();
-        let pose = |placed: &PlacedPatch| StampedPose::new(placed.timestamp_ns, t_map_world * placed.t_world_cam);
+        let r_map_world = self.frame.r_map_world;
+        let pose = |placed: &PlacedPatch| StampedPose::new(placed.timestamp_ns, r_map_world * placed.t_world_cam);
         let mut path: Vec<StampedPose> = self.map.patches.iter().map(pose).collect();
         path.sort_by_key(|pose| pose.timestamp_ns);
         write_trajectory(&self.folder.join("path.txt"), &path)?;

@@ -176,7 +176,10 @@ impl DenseMapArgs {
 
     /// Returns the frame of the products: that of the map, unless --up gives another.
     fn frame(&self, map: &DenseMap) -> MapFrame {
-        let Some(up) = self.up else { return map.frame() };
+        let up = match (self.up, map.frame) {
+            (None, Some(frame)) => return frame,
+            (up, _) => up.unwrap_or(Up::Level),
+        };
         let up = match up {
             Up::Level => yfslam::dense::Up::Level,
             Up::Camera => yfslam::dense::Up::Camera,

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use yfslam::{Config, Frame, Method};
+use yfslam_view::View;
 
 use super::checkpoint::Checkpoints;
 use crate::input::detector::LoadedDetector;
@@ -46,6 +47,16 @@ pub struct Setup<'a> {
     pub terminal: Terminal,
 }
 
+/// What goes along with the runs.
+#[derive(Clone, Copy)]
+pub struct Watchers<'a> {
+    pub map: &'a MapArgs,
+    pub interrupt: &'a Interrupt,
+    pub terminal: Terminal,
+    /// The page that shows them.
+    pub view: Option<&'a View>,
+}
+
 /// How the frames were processed.
 pub struct Driven {
     /// Durations of reading.
@@ -73,7 +84,9 @@ impl Setup<'_> {
             let mut config = self.config.clone();
             config.dynamic.method = *method;
             let folder = if is_only { out.clone() } else { out.for_method(describe(*method).0)? };
-            let recorder = Recorder::prepare(folder, &config, self.source.stamps_ns.len(), self.outputs)?;
+            let outputs = self.outputs.of_method(if is_only { None } else { Some(describe(*method).0) });
+            let camera = &self.source.camera.camera;
+            let recorder = Recorder::prepare(folder, &config, camera, self.source.stamps_ns.len(), &outputs)?;
             let run = MethodRun::prepare(config, self.source, own.take(), self.makes_dense_map, self.map)?;
             anyhow::Ok(RecordedRun { run, recorder, failures: Failures::new(self.terminal) })
         };
@@ -86,12 +99,16 @@ impl Setup<'_> {
 }
 
 impl RecordedRun {
-    /// Processes one frame.
-    fn process(&mut self, frame: &Result<Frame, Skip>) {
+    /// Processes one frame, and shows it as one of run `number`.
+    fn process(&mut self, frame: &Result<Frame, Skip>, view: Option<&View>, number: usize) {
         self.run.process(frame);
         if let Ok(frame) = frame {
             let index = self.run.pipeline.frames().total() - 1;
-            self.recorder.record(index, frame, self.run.pipeline.slam(), &mut self.failures);
+            let (tracked, slam) = (self.run.pipeline.last(), self.run.pipeline.slam());
+            self.recorder.record(index, frame, tracked, slam, &mut self.failures);
+            if let Some((view, tracked)) = view.zip(self.run.pipeline.last()) {
+                view.show(number, frame, tracked, self.run.pipeline.slam());
+            }
         }
     }
 
@@ -110,7 +127,9 @@ impl RecordedRun {
         map: &MapArgs,
         failures: &mut Failures,
     ) -> Result<RecordedResult<'a>> {
-        let Self { run, recorder, failures: earlier } = self;
+        let Self { mut run, mut recorder, failures: mut earlier } = self;
+        run.pipeline.finish_mapping();
+        recorder.finish_films(run.pipeline.slam(), &mut earlier);
         failures.add(&earlier);
         let (result, maps) = run.finish(context, map)?;
         let images = recorder.write(&result, maps, map, failures);
@@ -123,11 +142,10 @@ pub fn drive(
     source: &mut Source,
     mut detector: Option<&mut SharedDetector>,
     runs: &mut [RecordedRun],
-    map: &MapArgs,
+    watchers: &Watchers,
     mut checkpoints: Checkpoints,
-    interrupt: &Interrupt,
-    terminal: Terminal,
 ) -> Driven {
+    let Watchers { map, interrupt, terminal, view } = *watchers;
     let mut progress = Progress::new(terminal, &source.name, source.stamps_ns.len());
     let mut reading = Stages::default();
     let mut meter = ProcessMeter::start();
@@ -140,15 +158,19 @@ pub fn drive(
             // Live frames end with a signal, too, because waiting for the next one ends.
             break if source.frames.is_live() { interrupt.received() } else { None };
         };
+        // Live frames do not wait.
+        if let (Some(view), Ok(frame), false) = (view, &frame, source.frames.is_live()) {
+            view.pace(frame.timestamp_ns, || interrupt.received().is_some());
+        }
         let frames = distribute(frame, detector.as_deref_mut(), runs);
         std::thread::scope(|scope| {
-            let mut work = runs.iter_mut().zip(&frames);
+            let mut work = runs.iter_mut().zip(&frames).enumerate();
             let first = work.next();
-            for (run, frame) in work {
-                scope.spawn(|| run.process(frame));
+            for (number, (run, frame)) in work {
+                scope.spawn(move || run.process(frame, view, number));
             }
-            if let Some((run, frame)) = first {
-                run.process(frame);
+            if let Some((number, (run, frame))) = first {
+                run.process(frame, view, number);
             }
         });
         meter.frame();
@@ -158,6 +180,9 @@ pub fn drive(
         checkpoints.save_if_due(|| runs.iter_mut().for_each(|run| run.save_checkpoint(map, terminal)));
     };
     progress.finish();
+    if let Some(view) = view {
+        runs.iter().enumerate().for_each(|(number, run)| view.show_end(number, run.run.pipeline.slam()));
+    }
     if let Some(interrupted) = interrupted {
         terminal
             .note(&format!("{interrupted}; results are being written, and a second signal ends the program at once"));

@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod drive;
+mod watch;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -13,9 +14,11 @@ use yfslam::config::DepthSource;
 use yfslam::{Config, Method};
 use yfslam_eval::{EvalOptions, ExpectedFrames};
 use yfslam_report::{TableStyle, evaluation_table};
+use yfslam_view::ViewOptions;
 
 use self::checkpoint::Checkpoints;
-use self::drive::{Driven, RecordedResult, Setup, drive, finish};
+use self::drive::{Driven, RecordedResult, Setup, Watchers, drive, finish};
+pub use self::watch::WatchArgs;
 use crate::input::boxes;
 use crate::input::detector::DetectorArgs;
 use crate::input::settings::{MethodArg, SettingsArgs, describe};
@@ -49,6 +52,7 @@ Examples:
   yfslam run DIR --save-map lab.map --checkpoint 30                saves trajectory and map every 30 s
   yfslam run DIR --detect-every 3                                  runs the detector on every third frame
   yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
+  yfslam run DIR --view                                            shows the run on a page while it goes on
 
 Files in the output folder:
   trajectory.txt  final poses of all tracked frames, world from camera (TUM format)
@@ -133,6 +137,8 @@ pub struct RunArgs {
     /// Write `report.html`, a page with errors, figures, images and times.
     #[arg(long, help_heading = "Output")]
     report: bool,
+    #[command(flatten)]
+    watch: WatchArgs,
     /// Save trajectory.txt, live.txt and, with --save-map, the map at this interval of wall time, so that a killed run loses no more.
     #[arg(long, value_name = "SECONDS", value_parser = checkpoint::parse_interval, help_heading = "Output")]
     checkpoint: Option<Duration>,
@@ -185,7 +191,8 @@ pub fn run_at(args: &RunArgs, pace: Pace, terminal: Terminal) -> Result<()> {
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
     args.check_map(&out)?;
     let snapshots = args.report.then_some(if methods.len() == 1 { SNAPSHOTS } else { SNAPSHOTS_OF_EACH });
-    let outputs = RunOutputs { overlay: args.overlay, snapshots };
+    let WatchArgs { record, video, .. } = args.watch.clone();
+    let outputs = RunOutputs { overlay: args.overlay, snapshots, record, video };
     let setup =
         Setup { source: &source, config: &config, map: &args.map, outputs, makes_dense_map: args.dense, terminal };
     let (mut runs, mut shared) = setup.prepare(&methods, &out, detector)?;
@@ -193,12 +200,23 @@ pub fn run_at(args: &RunArgs, pace: Pace, terminal: Terminal) -> Result<()> {
     if let Pace::Live { rate } = pace {
         source = source.play_live(rate, &interrupt, terminal)?;
     }
-    let driven = drive(&mut source, shared.as_mut(), &mut runs, &args.map, checkpoints, &interrupt, terminal);
+    let alignment = args.evaluation.alignment(config.depth.source != DepthSource::Motion);
+    let view = ViewOptions {
+        start_ns: source.stamps_ns.first().copied(),
+        frames: Some(source.stamps_ns.len()),
+        truth: truth.as_ref().map(|truth| truth.poses.clone()).unwrap_or_default(),
+        alignment,
+        max_diff_ns,
+        ..ViewOptions::new(&source.name, source.camera.camera.clone())
+    };
+    let view = args.watch.start_view(view, &methods, &interrupt, terminal)?;
+    let watchers = Watchers { map: &args.map, interrupt: &interrupt, terminal, view: view.as_ref() };
+    let driven = drive(&mut source, shared.as_mut(), &mut runs, &watchers, checkpoints);
+    drop(view);
     let Driven { reading, process, interrupted } = driven;
 
     let detection = shared.map_or_else(DetectionTally::default, SharedDetector::into_tally);
     let (reading, truth) = (&reading, truth.as_ref());
-    let alignment = args.evaluation.alignment(config.depth.source != DepthSource::Motion);
     let context =
         EvalContext { source: &source, truth, max_diff_ns, alignment, boxes: &boxes, reading, detection: &detection };
     let mut failures = Failures::new(terminal);
