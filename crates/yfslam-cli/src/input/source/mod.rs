@@ -22,8 +22,8 @@ use yfslam_io::{CameraSource, TrajectoryFile};
 
 use crate::input::trajectory::checked_poses;
 use crate::ui::terminal::Terminal;
-pub use args::SourceArgs;
-pub use bag::describe as describe_bag;
+pub use args::{SensorArg, SourceArgs};
+pub use bag::{BagArgs, describe as describe_bag};
 pub use folder::open_sequence;
 use frames::{Frames, Player};
 pub use masks::MaskTally;
