@@ -72,6 +72,7 @@ impl Camera {
         Ok(Self { source })
     }
 
+    /// Loads a preset, such as "bonn" or "tum1", or a camera file of any common kind.
     #[staticmethod]
     fn load(spec: &Bound<'_, PyAny>) -> PyResult<Self> {
         let path: PathBuf = spec.extract()?;
@@ -79,49 +80,59 @@ impl Camera {
         Ok(Self { source })
     }
 
+    /// Writes the camera to a file in TOML, which `load` reads.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         write_camera(&path, &self.source.camera, self.source.depth_factor, ABOUT).map_err(failure)
     }
 
+    /// Returns the camera as text in TOML.
     fn to_toml(&self) -> PyResult<String> {
         camera_toml(&self.source.camera, self.source.depth_factor, ABOUT).map_err(failure)
     }
 
+    /// Width of the images, px.
     #[getter]
     fn width(&self) -> usize {
         self.source.camera.width
     }
 
+    /// Height of the images, px.
     #[getter]
     fn height(&self) -> usize {
         self.source.camera.height
     }
 
+    /// Focal length in x, px.
     #[getter]
     fn fx(&self) -> f64 {
         self.source.camera.fx
     }
 
+    /// Focal length in y, px.
     #[getter]
     fn fy(&self) -> f64 {
         self.source.camera.fy
     }
 
+    /// Principal point in x, px.
     #[getter]
     fn cx(&self) -> f64 {
         self.source.camera.cx
     }
 
+    /// Principal point in y, px.
     #[getter]
     fn cy(&self) -> f64 {
         self.source.camera.cy
     }
 
+    /// Frames per second.
     #[getter]
     fn fps(&self) -> f64 {
         self.source.camera.fps
     }
 
+    /// Distortion coefficients k1, k2, p1, p2, k3 and, for some lenses, k4, k5, k6 (OpenCV).
     #[getter]
     fn distortion(&self) -> Vec<f64> {
         let camera = &self.source.camera;
@@ -129,27 +140,32 @@ impl Camera {
         camera.distortion.iter().chain(rational).copied().collect()
     }
 
+    /// Metres per unit of 16-bit depth images; None if unknown.
     #[getter]
     fn depth_scale(&self) -> Option<f64> {
         self.scale()
     }
 
+    /// Time from the first to the last row of an image, ms; 0 for a global shutter, None if unknown.
     #[getter]
     fn readout_ms(&self) -> Option<f64> {
         self.source.camera.readout_ms
     }
 
+    /// Baseline of a stereo camera, m; None if unknown.
     #[getter]
     fn baseline_m(&self) -> Option<f64> {
         let camera = &self.source.camera;
         (!self.source.missing.baseline).then(|| camera.bf / camera.fx)
     }
 
+    /// The preset or file.
     #[getter]
     fn origin(&self) -> &str {
         &self.source.origin
     }
 
+    /// The 3 x 3 matrix of the intrinsics.
     #[getter]
     fn matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let c = &self.source.camera;

@@ -61,36 +61,43 @@ impl Frame {
         Ok(Self { frame: given.frame(timestamp_ns)? })
     }
 
+    /// Time of the colour image, ns.
     #[getter]
     fn timestamp_ns(&self) -> i64 {
         self.frame.timestamp_ns
     }
 
+    /// Time of the depth image, ns; None if it has no time stamp of its own.
     #[getter]
     fn depth_timestamp_ns(&self) -> Option<i64> {
         self.frame.depth_timestamp_ns
     }
 
+    /// Colour, height x width x 3, uint8.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<u8>>> {
         images::color_array(py, &self.frame.color)
     }
 
+    /// Right image of a stereo pair; None without.
     #[getter]
     fn right<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<u8>>>> {
         self.frame.right.as_deref().map(|right| images::color_array(py, right)).transpose()
     }
 
+    /// Depth in units of `depth_scale`, height x width, uint16; 0 where nothing was measured. None without.
     #[getter]
     fn depth<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<u16>>>> {
         self.frame.depth.as_deref().map(|depth| images::plane_array(py, &depth.raw)).transpose()
     }
 
+    /// Metres per unit of `depth`.
     #[getter]
     fn depth_scale(&self) -> Option<f64> {
         self.frame.depth.as_deref().map(|depth| f64::from(depth.metres_per_unit))
     }
 
+    /// Depth in metres, float32; 0 where nothing was measured. None without.
     #[getter]
     fn depth_m<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         let Some(depth) = self.frame.depth.as_deref() else { return Ok(None) };
@@ -98,11 +105,13 @@ impl Frame {
         crate::arrays::array(py, [depth.raw.height(), depth.raw.width()], metres).map(Some)
     }
 
+    /// Movable objects, uint8: 0 where there is none. None without.
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<u8>>>> {
         self.frame.mask.as_deref().map(|mask| images::plane_array(py, mask)).transpose()
     }
 
+    /// Known detections, N x 6: x_min, y_min, x_max, y_max (px), score, class. None without.
     #[getter]
     fn detections<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         self.frame.detections.as_deref().map(|detections| detections_array(py, detections)).transpose()

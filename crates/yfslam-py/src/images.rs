@@ -28,9 +28,10 @@ pub fn color(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Arc<RgbImage>> {
         if channels != 3 || !is_size(width, height) {
             return Err(wrong_shape(array, name, NEEDED));
         }
-        let pixels: Vec<[u8; 3]> = match rgb.as_slice() {
-            Ok(packed) => packed.as_chunks::<3>().0.to_vec(),
-            Err(_) => {
+        // Not the method of the array, which also takes Fortran's order for packed.
+        let pixels: Vec<[u8; 3]> = match view.as_slice() {
+            Some(packed) => packed.as_chunks::<3>().0.to_vec(),
+            None => {
                 let pixel = |row: usize, column: usize| std::array::from_fn(|c| view[[row, column, c]]);
                 (0..height).flat_map(|row| (0..width).map(move |column| pixel(row, column))).collect()
             }

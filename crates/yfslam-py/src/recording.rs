@@ -111,41 +111,49 @@ pub fn open(
 
 #[pymethods]
 impl Recording {
+    /// Short name of the sequence.
     #[getter]
     fn name(&self) -> &str {
         &self.name
     }
 
+    /// What the sequence was taken for, and what was assumed.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.notes.clone()
     }
 
+    /// What is probably a mistake.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
     }
 
+    /// The camera.
     #[getter]
     fn camera(&self) -> Camera {
         self.camera.clone()
     }
 
+    /// "rgbd", "stereo" or "mono".
     #[getter]
     fn sensor(&self) -> &'static str {
         self.sensor
     }
 
+    /// Whether frames carry boxes of the sequence, so that no detector is needed.
     #[getter]
     fn has_boxes(&self) -> bool {
         self.has_boxes
     }
 
+    /// Times of all frames, ns, also of those that will turn out to be unusable.
     #[getter]
     fn timestamps_ns<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_slice(py, &self.stamps_ns)
     }
 
+    /// Returns the ground truth, of `file` or of the sequence; None if it has none.
     #[pyo3(signature = (file=None))]
     fn truth(&self, py: Python<'_>, file: Option<PathBuf>) -> PyResult<Option<Trajectory>> {
         let truth = py.detach(|| {
@@ -187,6 +195,7 @@ pub struct RecordingIterator {
 
 #[pymethods]
 impl RecordingIterator {
+    /// Why frames were left out so far.
     #[getter]
     fn skipped(&self) -> Vec<String> {
         self.skipped.lock().unwrap_or_else(PoisonError::into_inner).clone()

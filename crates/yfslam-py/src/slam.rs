@@ -5,15 +5,18 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use yfslam::dense::{DenseConfig, Up};
 use yfslam::{Execution, MapUse, SavedMap, TrackingState};
 use yfslam_io::write_atomically;
 
 use crate::camera::Camera;
-use crate::error::{FrameRejectedError, failure};
-use crate::frame::{Frame, Given};
+use crate::dense::{DenseMap, UpArg};
+use crate::error::{FrameRejected, failure};
+use crate::frame::{Frame, Given, detections_array};
+use crate::maps::FeatureRows;
 use crate::tracked::{Tracked, state_name};
 use crate::trajectory::Trajectory;
-use crate::{config, detector, logging};
+use crate::{config, detector, logging, maps};
 
 /// The system; its methods may be called from any thread, one after the other.
 #[pyclass(frozen, module = "yfslam", weakref)]
@@ -21,6 +24,7 @@ pub struct Slam {
     inner: Mutex<Option<Inner>>,
     camera: Camera,
     depth_scale: Option<f64>,
+    dense_config: DenseConfig,
 }
 
 struct Inner {
@@ -65,6 +69,7 @@ impl Slam {
         let saved = map.map(saved_map).transpose()?;
         let execution = if threaded { Execution::Threaded } else { Execution::Inline };
         let source = camera.source.camera.clone();
+        let dense_config = settings.dense.clone();
         let built = py.detach(|| {
             let mut builder = yfslam::Slam::builder(source).execution(execution);
             if let Some(detector) = detector {
@@ -82,9 +87,11 @@ impl Slam {
         let state = if map.is_some() { TrackingState::Lost } else { TrackingState::NotInitialized };
         let inner = Inner { slam, state, live: Vec::new(), resets: 0 };
         let depth_scale = depth_scale.or_else(|| camera.scale());
-        Ok(Self { inner: Mutex::new(Some(inner)), camera, depth_scale })
+        Ok(Self { inner: Mutex::new(Some(inner)), camera, depth_scale, dense_config })
     }
 
+    /// Tracks a Frame, or a time stamp in ns with arrays: rgb is uint8, height x width x 3 or height x width; depth is uint16 in units of
+    /// depth_scale, or float32 in metres. Lost is no error: see `state` and `reason` of the result.
     #[pyo3(signature = (frame, rgb=None, depth=None, *, right=None, depth_scale=None, depth_timestamp_ns=None, detections=None,
         mask=None))]
     #[expect(clippy::too_many_arguments, reason = "they are named in Python")]
@@ -117,7 +124,7 @@ impl Slam {
         logging::hand_over(py)?;
         match result {
             Ok(tracked) => Ok(Tracked { tracked }),
-            Err(rejected) => Err(FrameRejectedError::new_err(rejected.to_string())),
+            Err(rejected) => Err(FrameRejected::new_err(rejected.to_string())),
         }
     }
 
@@ -131,28 +138,34 @@ impl Slam {
         trajectory
     }
 
+    /// Returns the poses of all tracked frames as the map has them now.
     fn trajectory(&self, py: Python<'_>) -> PyResult<Trajectory> {
         self.with(py, |inner| Trajectory::of(inner.slam.trajectory()))
     }
 
+    /// Returns the poses for each submap, each in its own world.
     fn trajectories(&self, py: Python<'_>) -> PyResult<Vec<Trajectory>> {
         self.with(py, |inner| inner.slam.trajectories().into_iter().map(Trajectory::of).collect())
     }
 
+    /// Returns the poses as they were estimated at the time of each frame.
     fn live_trajectory(&self, py: Python<'_>) -> PyResult<Trajectory> {
         self.with(py, |inner| Trajectory::of(inner.live.iter().copied()))
     }
 
+    /// The camera.
     #[getter]
     fn camera(&self) -> Camera {
         self.camera.clone()
     }
 
+    /// "not initialised", "tracking" or "lost".
     #[getter]
     fn state(&self, py: Python<'_>) -> PyResult<&'static str> {
         self.with(py, |inner| state_name(inner.state))
     }
 
+    /// Counts of this session.
     #[getter]
     fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (s, keyframes, landmarks) = self.with(py, |inner| {
@@ -178,14 +191,61 @@ impl Slam {
         Ok(dict)
     }
 
+    /// Saves the map, with the dense map if there is one, for the argument `map` and for `yfslam map`.
     fn save_map(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let bytes = self.with(py, Inner::encode)?.map_err(failure)?;
         py.detach(|| write_atomically(&path, |file| file.write_all(&bytes))).map_err(failure)
     }
 
+    /// Returns the map as bytes, for the argument `map`.
     fn map_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = self.with(py, Inner::encode)?.map_err(failure)?;
         Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Returns the features of the last frame.
+    fn features<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rows = self.with(py, |inner| {
+            let features = inner.slam.features().to_vec();
+            let matched = (0..features.len()).map(|index| inner.slam.is_matched(index)).collect();
+            FeatureRows { features, matched }
+        })?;
+        maps::features(py, &rows)
+    }
+
+    /// Returns the detections of movable objects in the last frame, N x 6.
+    fn detections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let found = self.with(py, |inner| inner.slam.detections().to_vec())?;
+        Ok(detections_array(py, &found)?.into_any())
+    }
+
+    /// Returns the parts of the last frame that move, N x 6: box, least and greatest depth in m.
+    fn moving_regions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let found = self.with(py, |inner| inner.slam.moving_regions().to_vec())?;
+        maps::regions(py, &found)
+    }
+
+    /// Returns the landmarks of the map.
+    fn landmarks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rows = self.with(py, |inner| maps::landmark_rows(inner.slam.map()))?;
+        maps::landmarks(py, &rows)
+    }
+
+    /// Returns the keyframes of the map.
+    fn keyframes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rows = self.with(py, |inner| maps::keyframe_rows(inner.slam.map()))?;
+        maps::keyframes(py, &rows)
+    }
+
+    /// Returns the dense map as it is now; the system must have been made with dense=True. up: "level", "camera" or a direction.
+    #[pyo3(signature = (*, up=UpArg(Up::Level)))]
+    fn dense_map(&self, py: Python<'_>, up: UpArg) -> PyResult<DenseMap> {
+        let config = self.dense_config.clone();
+        self.with(py, |inner| {
+            let view = inner.slam.dense();
+            let mut view = view.map_err(|_| failure("this Slam makes no dense map; make it with dense=True"))?;
+            Ok(DenseMap::new(view.snapshot(), config, up.0))
+        })?
     }
 
     /// Ends the threads of the system.

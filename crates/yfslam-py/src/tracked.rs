@@ -24,51 +24,61 @@ pub fn state_name(state: TrackingState) -> &'static str {
 
 #[pymethods]
 impl Tracked {
+    /// Time of the frame, ns.
     #[getter]
     fn timestamp_ns(&self) -> i64 {
         self.tracked.timestamp_ns
     }
 
+    /// "not initialised", "tracking" or "lost".
     #[getter]
     fn state(&self) -> &'static str {
         state_name(self.tracked.state)
     }
 
+    /// Whether the pose is known.
     #[getter]
     fn is_tracking(&self) -> bool {
         self.tracked.state == TrackingState::Tracking
     }
 
+    /// Pose as a 4 x 4 matrix, world from camera; None unless tracking.
     #[getter]
     fn pose<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         self.tracked.t_world_cam.as_ref().map(|pose| arrays::pose(py, pose)).transpose()
     }
 
+    /// Covariance, 6 x 6, of the pose error d in pose @ exp(d), d = (translation in m, rotation in rad) along the axes of the camera.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         self.tracked.covariance.as_ref().map(|covariance| arrays::covariance(py, covariance)).transpose()
     }
 
+    /// Matched landmarks that fit the pose.
     #[getter]
     fn inliers(&self) -> usize {
         self.tracked.inliers
     }
 
+    /// Whether the frame became a keyframe.
     #[getter]
     fn is_keyframe(&self) -> bool {
         self.tracked.is_keyframe
     }
 
+    /// Whether a loop was closed: all poses may have changed.
     #[getter]
     fn closed_loop(&self) -> bool {
         self.tracked.loop_closure.is_some()
     }
 
+    /// Why the pose is not known; None while tracking.
     #[getter]
     fn reason(&self) -> Option<String> {
         self.tracked.lost_reason.map(|reason| reason.to_string())
     }
 
+    /// Wall time of the stages, ms.
     #[getter]
     fn times_ms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let times = &self.tracked.times;

@@ -42,16 +42,19 @@ impl Trajectory {
         Ok(Self { poses: poses.collect::<PyResult<_>>()? })
     }
 
+    /// Times, N, int64, ns.
     #[getter]
     fn timestamps_ns<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_iter(py, self.poses.iter().map(|pose| pose.timestamp_ns))
     }
 
+    /// Poses, N x 4 x 4, world from camera.
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         arrays::poses(py, self.poses.iter().map(|pose| pose.t_world_cam))
     }
 
+    /// Positions of the camera, N x 3, m.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         rows(py, self.poses.iter().map(|pose| position(&pose.t_world_cam)))
@@ -68,6 +71,7 @@ impl Trajectory {
         )
     }
 
+    /// Writes the trajectory in the format of TUM.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         write_trajectory(&path, &self.poses).map_err(failure)
     }
