@@ -68,7 +68,7 @@ export! {
         guarded(|| {
             info.check("info")?;
             grid.check("grid")?;
-            if !(low_m < high_m) {
+            if low_m.is_nan() || high_m.is_nan() || low_m >= high_m {
                 return Err(Failure::argument(format!("the heights {low_m} and {high_m} m do not ascend")));
             }
             let mut state = slam.required("slam")?.lock()?;
