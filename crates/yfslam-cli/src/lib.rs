@@ -23,6 +23,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use ui::interrupt::Interrupted;
+pub use ui::program::{ProgramFiles, set_files};
 use ui::{messages, terminal};
 
 /// Runs the program with these arguments, the first of which is its name, and returns its exit code. Help and wrong arguments end the

@@ -132,6 +132,16 @@ def test_the_program_is_installed():
     assert wrong.returncode == 1 and "nowhere" in wrong.stderr
 
 
+def test_the_program_starts_itself_again(tmp_path):
+    spec = SPEC.replace("frames=24", "frames=6")
+    for out, command in (("a", [sys.executable, "-m", "yfslam"]), ("b", [os.path.join(os.path.dirname(sys.executable), "yfslam")])):
+        done = subprocess.run(
+            [*command, "bench", spec, "--methods", "none", "-q", "-o", str(tmp_path / out)], capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        assert list((tmp_path / out / "cells").iterdir())
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_ctrl_c_ends_a_loop_and_the_program():
     code = textwrap.dedent(

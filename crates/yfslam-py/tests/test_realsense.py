@@ -2,6 +2,7 @@
 
 import gc
 import pathlib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -68,3 +69,40 @@ def test_a_lens_that_is_not_supported_is_refused():
         camera_of(intrinsics)
     intrinsics.model = rs.distortion.brown_conrady
     assert camera_of(intrinsics).distortion[0] == pytest.approx(0.1)
+
+
+def opened_without_a_camera() -> RealSense:
+    camera = RealSense.__new__(RealSense)
+    camera._playback, camera._last, camera._last_ns, camera.repeated, camera.lost = None, -1, -1, 0, None
+    camera.camera = yfslam.Camera(64, 48, 60.0, 60.0, 31.5, 23.5, depth_scale=0.001)
+    return camera
+
+
+def test_the_loss_of_a_camera_ends_the_frames():
+    camera = opened_without_a_camera()
+    camera._pipeline = SimpleNamespace(try_wait_for_frames=lambda _: (False, None))
+    assert list(camera) == [] and "cable" in camera.lost
+
+
+def test_an_image_that_is_delivered_twice_is_left_out():
+    def image(number, stamp_ms, pixels, kind=rs.format.rgb8):
+        profile = SimpleNamespace(format=lambda: kind)
+        return SimpleNamespace(
+            get_frame_number=lambda: number,
+            get_timestamp=lambda: stamp_ms,
+            get_data=lambda: pixels,
+            get_profile=lambda: profile,
+        )
+
+    camera = opened_without_a_camera()
+    rgb, depth = np.zeros((48, 64, 3), np.uint8), np.zeros((48, 64), np.uint16)
+    rgb[:, :, 0] = 200
+    numbers = [(1, 0.0), (1, 0.0), (2, 33.0), (3, 33.0), (4, 66.0)]
+    found = [camera._frame(image(number, stamp, rgb), image(number, stamp, depth)) for number, stamp in numbers]
+    assert [frame is not None for frame in found] == [True, False, True, False, True] and camera.repeated == 2
+    assert found[2].timestamp_ns == 33_000_000 and found[2].depth_scale == pytest.approx(0.001)
+    # Blue, green, red become red, green, blue.
+    bgr = camera._frame(image(5, 99.0, rgb[:, :, ::-1], rs.format.bgr8), image(5, 99.0, depth))
+    assert (bgr.rgb == rgb).all()
+    with pytest.raises(yfslam.Error, match="format"):
+        camera._frame(image(6, 132.0, rgb, rs.format.yuyv), image(6, 132.0, depth))
