@@ -16,6 +16,6 @@ ls -l "$work"/wheels
 cd crates/yfslam-py
 "$python" -m mypy --strict --config-file pyproject.toml -p yfslam
 "$python" -m mypy --strict --config-file pyproject.toml ../../examples/python/*.py
-"$python" -m mypy.stubtest yfslam._yfslam --ignore-missing-stub --allowlist tests/stubtest-allowlist.txt
+"$python" -m mypy.stubtest yfslam._yfslam --allowlist tests/stubtest-allowlist.txt
 "$python" -m pytest -q -p no:cacheprovider "$@"
 (cd "$work" && for example in "$OLDPWD"/../../examples/python/*.py; do "$python" "$example"; done)

@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use numpy::ndarray::ArrayView2;
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -68,8 +69,13 @@ pub fn depth(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<Arc<Depth
                  camera with it; 0.001 for millimetres, 1 / 5000 for TUM",
             ));
         };
-        let values: Vec<u16> = view.iter().copied().collect();
-        return DepthImage::from_u16(&values, width, height, width, scale as f32).map(Arc::new).map_err(failure);
+        let metres_per_unit = scale as f32;
+        if !(metres_per_unit > 0.0 && metres_per_unit.is_finite()) {
+            let text = format!("depth_scale is {scale}; give metres per unit, such as 0.001 for millimetres");
+            return Err(PyValueError::new_err(text));
+        }
+        let raw = plane(width, height, values(&view))?;
+        return Ok(Arc::new(DepthImage { raw, metres_per_unit }));
     }
     if let Ok(metres) = value.extract::<PyReadonlyArray2<'_, f32>>() {
         let view = metres.as_array();
@@ -77,8 +83,7 @@ pub fn depth(value: &Bound<'_, PyAny>, scale: Option<f64>) -> PyResult<Arc<Depth
         if !is_size(width, height) {
             return Err(wrong_shape(array, "depth", NEEDED));
         }
-        let values: Vec<f32> = view.iter().copied().collect();
-        return DepthImage::from_f32(&values, width, height, width).map(Arc::new).map_err(failure);
+        return DepthImage::from_f32(&values(&view), width, height, width).map(Arc::new).map_err(failure);
     }
     Err(wrong(array, "depth", NEEDED, "uint16 or float32"))
 }
@@ -120,10 +125,17 @@ fn is_size(width: usize, height: usize) -> bool {
     (1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height)
 }
 
+/// Returns the elements row by row; in one piece where they lie so.
+fn values<T: Copy>(view: &ArrayView2<'_, T>) -> Vec<T> {
+    view.as_slice().map_or_else(|| view.iter().copied().collect(), <[T]>::to_vec)
+}
+
 fn image<T: Copy + Default>(width: usize, height: usize, pixels: Vec<T>) -> PyResult<Arc<Image<T>>> {
-    let image = Image::from_vec(width, height, pixels);
-    image
-        .map(Arc::new)
+    plane(width, height, pixels).map(Arc::new)
+}
+
+fn plane<T: Copy + Default>(width: usize, height: usize, pixels: Vec<T>) -> PyResult<Image<T>> {
+    Image::from_vec(width, height, pixels)
         .ok_or_else(|| PyValueError::new_err("the array does not have the number of elements of its shape"))
 }
 

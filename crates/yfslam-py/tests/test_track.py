@@ -99,6 +99,8 @@ def test_depth_of_16_bits_needs_a_unit(frames):
     camera = yfslam.Camera(320, 240, 267.0, 267.0, 159.5, 119.5)
     with pytest.raises(ValueError, match="depth_scale"):
         yfslam.Slam(camera).track(0, frames[0].rgb, frames[0].frame.depth)
+    with pytest.raises(ValueError, match="depth_scale is -1"):
+        yfslam.Slam(camera, depth_scale=-1.0).track(0, frames[0].rgb, frames[0].frame.depth)
     slam = yfslam.Slam(camera, depth_scale=frames[0].frame.depth_scale, detector=None)
     assert slam.track(0, frames[0].rgb, frames[0].frame.depth)
 
