@@ -1,6 +1,6 @@
 """Processor time of the Python way divided by that of the program, on one recording, in pairs.
 
-    python tools/python/overhead.py target/release/yfslam RECORDING CAMERA [PAIRS]
+    python tools/python/overhead.py target/release/yfslam RECORDING CAMERA [PAIRS [frames|arrays]]
 
 In a pair, the program and a process of Python that tracks the same frames run one after the other, the order changes from pair to pair.
 Printed are the medians of user and system time, and the median, least and greatest ratio of the pairs.
@@ -47,7 +47,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         ours, theirs = os.path.join(folder, "trajectory.txt"), os.path.join(folder, "run")
         run = [program, "run", recording, "--camera", camera, "-q", "-o", theirs]
-        for name, code in (("frames", FRAMES), ("numpy arrays", ARRAYS)):
+        for name, code in (("frames", FRAMES), ("arrays", ARRAYS)):
+            if len(sys.argv) > 5 and name != sys.argv[5]:
+                continue
             python = [sys.executable, "-c", code, recording, camera, ours]
             times = []
             for pair in range(pairs):
