@@ -39,6 +39,11 @@ impl Default for DetectorConfig {
 }
 
 impl DetectorConfig {
+    /// Returns the configuration of a detector that reports all boxes that the dynamic filter of `config` may use.
+    pub fn for_filter(config: &yfslam::Config) -> Self {
+        Self { score_threshold: config.dynamic.keep_score.min(config.dynamic.open_score), ..Self::default() }
+    }
+
     /// Refuses values out of range.
     pub(crate) fn check(&self) -> Result<(), String> {
         let Self { score_threshold, iou_threshold, fuse_iou, anchors, .. } = self;

@@ -108,14 +108,15 @@ pub struct DetectorTime {
 /// # Errors
 /// As [`load`].
 pub fn load_for(args: &DetectorArgs, config: &Config) -> Result<LoadedDetector> {
-    let score_threshold = config.dynamic.keep_score.min(config.dynamic.open_score);
+    let for_filter = DetectorConfig::for_filter(config);
+    let score_threshold = for_filter.score_threshold;
     ensure!(
         score_threshold > 0.0 && score_threshold < 1.0,
         "dynamic.keep_score and dynamic.open_score are {} and {}; set them between 0 and 1",
         config.dynamic.keep_score,
         config.dynamic.open_score
     );
-    load(args, DetectorConfig { score_threshold, ..Default::default() })
+    load(args, for_filter)
 }
 
 /// Loads the requested network, else the embedded one.

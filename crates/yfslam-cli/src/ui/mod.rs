@@ -4,6 +4,7 @@ pub mod command_line;
 pub mod failures;
 pub mod interrupt;
 pub mod messages;
+pub mod program;
 pub mod progress;
 pub mod terminal;
 pub mod verbosity;

@@ -29,6 +29,11 @@ impl Terminal {
         Self { verbosity }
     }
 
+    /// Prints only warnings and errors; logging stays as the process has set it up.
+    pub fn quiet() -> Self {
+        Self { verbosity: Verbosity { quiet: true, verbose: 0 } }
+    }
+
     /// Returns whether progress and notes are suppressed.
     pub fn is_quiet(self) -> bool {
         self.verbosity.quiet

@@ -29,6 +29,7 @@ use crate::output::folder::OutputFolder;
 use crate::ui::command_line::command_line;
 use crate::ui::failures::Failures;
 use crate::ui::interrupt::Interrupt;
+use crate::ui::program;
 use crate::ui::progress::Progress;
 use crate::ui::terminal::Terminal;
 
@@ -111,11 +112,12 @@ pub fn run(args: &BenchArgs, terminal: Terminal) -> Result<()> {
     external::check(&args.external, &args.methods, &groups)?;
     let out = OutputFolder::prepare(args.out.as_deref(), "bench")?;
     ["cells", "tables"].iter().try_for_each(|part| prepare_folder(&out.path().join(part)))?;
-    let program = std::env::current_exe().context("cannot find the file of this program")?;
-    let binary = std::fs::read(&program).with_context(|| format!("cannot read {}", program.display()))?;
+    let program = program::files().context("cannot find the file of this program")?;
+    let binary =
+        std::fs::read(&program.content).with_context(|| format!("cannot read {}", program.content.display()))?;
     let bench = Bench {
         folder: out.path().into(),
-        program,
+        program: program.start,
         program_crc32: format!("{:08x}", crc32fast::hash(&binary)),
         jobs: args.jobs.into(),
         extra: args.extra.clone(),

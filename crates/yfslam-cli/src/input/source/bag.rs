@@ -37,6 +37,20 @@ pub struct BagArgs {
 }
 
 impl BagArgs {
+    /// Chooses these topics.
+    pub fn of(topics: TopicChoice) -> Self {
+        let TopicChoice { color, depth, left, right, camera_info, truth, base_frame } = topics;
+        Self {
+            color_topic: color,
+            depth_topic: depth,
+            left_topic: left,
+            right_topic: right,
+            camera_info_topic: camera_info,
+            truth_topic: truth,
+            base_frame,
+        }
+    }
+
     /// Returns the topics that the user chose.
     pub fn choice(&self) -> TopicChoice {
         TopicChoice {

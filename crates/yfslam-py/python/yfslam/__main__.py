@@ -1,0 +1,7 @@
+"""``python -m yfslam`` is the program ``yfslam``."""
+
+import sys
+
+from ._command import main
+
+sys.exit(main())
