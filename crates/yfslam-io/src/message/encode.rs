@@ -199,7 +199,7 @@ mod tests {
         let read = Transform::read_with_child(&mut Reader::new(Wire::Cdr, &bytes).unwrap()).unwrap();
         assert_eq!((read.stamp_ns, read.parent.as_str(), read.child.as_str()), (1_500_000_007, "map", "camera"));
         assert!((read.t_parent_child.inverse() * pose).translation.vector.norm() < 1e-12);
-        // Header, child, then 7 + 36 + 6 + 36 numbers.
-        assert_eq!(bytes.len(), 4 + 28 + 8 * 85);
+        // Header and child with padding, then 7 + 36 + 6 + 36 numbers.
+        assert_eq!(bytes.len(), 4 + 32 + 8 * 85);
     }
 }
