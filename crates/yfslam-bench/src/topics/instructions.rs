@@ -1,7 +1,7 @@
 //! What a frame costs on a small board, in instructions: the aarch64 program in qemu, with a plugin that counts. The count is the same
 //! on every machine and at every load. `tools/instructions.sh` builds both and measures the topic.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
@@ -75,7 +75,7 @@ fn jobs(setup: &Setup) -> Result<Vec<Job>> {
 }
 
 /// Runs the aarch64 program in qemu and returns the number of its instructions.
-fn instructions(setup: &Setup, program: &PathBuf, plugin: &PathBuf, words: &[String]) -> Result<f64> {
+fn instructions(setup: &Setup, program: &Path, plugin: &Path, words: &[String]) -> Result<f64> {
     let counted = setup.program.out.join("instructions.txt");
     let qemu = Program { path: "qemu-aarch64".into(), ..setup.program.clone() };
     let plugin = format!("{},out={}", runs::text(plugin)?, runs::text(&counted)?);

@@ -52,7 +52,8 @@ impl MapFrame {
     pub(crate) fn from_section(packed: PackedSection<'_>) -> Result<Self, ContainerError> {
         let ([x, y, z, w], is_level): ([f64; 4], bool) = packed.unpack()?;
         let quaternion = Quaternion::new(w, x, y, z);
-        if !((quaternion.norm() - 1.0).abs() < 1e-6) {
+        let error = (quaternion.norm() - 1.0).abs();
+        if error.is_nan() || error > 1e-6 {
             let what = format!("the map frame has the rotation {x} {y} {z} {w}, which is no unit quaternion");
             return Err(ContainerError::Records(what));
         }
