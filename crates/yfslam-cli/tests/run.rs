@@ -105,9 +105,9 @@ fn an_overlay_has_one_image_for_each_frame_and_none_of_an_earlier_run() {
         names
     };
     succeeds(folder.path(), &["run", "seq", "--method", "none", "--overlay", "--out", "o", "--end", "5"]);
-    assert_eq!(images(), ["000000.png", "000001.png", "000002.png", "000003.png", "000004.png"]);
+    assert_eq!(images(), ["000000.jpg", "000001.jpg", "000002.jpg", "000003.jpg", "000004.jpg"]);
     succeeds(folder.path(), &["run", "seq", "--method", "none", "--overlay", "--out", "o", "--end", "2"]);
-    assert_eq!(images(), ["000000.png", "000001.png"]);
+    assert_eq!(images(), ["000000.jpg", "000001.jpg"]);
 }
 
 #[test]

@@ -99,8 +99,16 @@ fn a_run_ends_in_order_after_sigint_and_sigterm() {
         for file in ["trajectory.txt", "live.txt"] {
             assert_eq!(poses(&out.join(file)) as u64, tracked, "{file}");
         }
-        let files =
-            ["config.toml", "keyframes.txt", "live.txt", "map.ply", "report.html", "run.json", "trajectory.txt"];
+        let files = [
+            "T_map_world.txt",
+            "config.toml",
+            "keyframes.txt",
+            "live.txt",
+            "map.ply",
+            "report.html",
+            "run.json",
+            "trajectory.txt",
+        ];
         assert_eq!(names(&out), files);
         assert!(fs::read_to_string(out.join("report.html")).unwrap().contains(&format!("interrupted by {name} after")));
         let stderr = fs::read_to_string(folder.path().join("stderr")).unwrap();

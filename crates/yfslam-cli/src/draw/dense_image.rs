@@ -135,16 +135,16 @@ mod tests {
     fn from_above_the_higher_of_two_points_is_drawn_and_the_ceiling_is_not() {
         let (red, blue, white) = ([200, 0, 0], [0, 0, 200], [255; 3]);
         let points = [
-            point([0.0, 0.0, 0.0], blue),
-            point([0.0, 0.0, 1.0], red),
-            point([2.0, 1.0, 0.0], blue),
-            point([2.0, 1.0, 2.6], white),
+            point([0.0, 1.0, 0.0], blue),
+            point([0.0, 1.0, 1.0], red),
+            point([2.0, 0.0, 0.0], blue),
+            point([2.0, 0.0, 2.6], white),
         ];
-        // 2.4 m across and 1.4 m up at 100 px a metre; x is to the right, y up.
+        // 2.4 m across and 1.4 m up at 100 px a metre; x is to the right, y up. The scale is at the bottom left.
         let image = from_above(&points, 0.1, 2.0, [240, 140]);
         let at = |x: f32, y: f32| image.row(((1.2 - y) * 100.0) as usize)[((x + 0.2) * 100.0) as usize];
-        assert!(at(0.0, 0.0)[0] > 150 && at(0.0, 0.0)[2] == 0);
-        assert!(at(2.0, 1.0)[2] > 150 && at(2.0, 1.0)[0] == 0);
+        assert!(at(0.0, 1.0)[0] > 150 && at(0.0, 1.0)[2] == 0);
+        assert!(at(2.0, 0.0)[2] > 150 && at(2.0, 0.0)[0] == 0);
         assert_eq!(at(1.0, 0.5), PAPER);
     }
 }
