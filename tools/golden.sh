@@ -4,8 +4,8 @@
 #   tools/golden.sh YFSLAM DATA OUT > hashes.txt         DATA as in CONTRIBUTING.md, OUT a folder that is made
 #   tools/golden.sh YFSLAM DATA OUT | diff tools/golden.sha256 -
 #
-# A change that must not alter results leaves every line as it is. The hashes in golden.sha256 hold for x86-64 processors with AVX2: other
-# processors are not promised the same bits yet. Files that hold times (run.json, report.html) or help texts (config.toml) are left out.
+# A change that must not alter results leaves every line as it is. The hashes in golden.sha256 hold for x86-64 processors with AVX2; for others
+# see tools/same_bits.sh. Files that hold times (run.json, report.html) or help texts (config.toml) are left out.
 set -euo pipefail
 yfslam=$(realpath "$1")
 data=$(realpath "$2")

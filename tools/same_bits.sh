@@ -6,7 +6,7 @@
 # PROGRAMS is the folder of tools/dist.sh. The x86-64 program runs here, and in qemu as a processor of 2008 (SSE4.2), of 2013 (AVX2, FMA)
 # and without any extension beyond SSE2; the aarch64 program in qemu; example 07 here and as WebAssembly in wasmtime. Needs Debian's package
 # qemu-user, PyPI's wasmtime, and for WebAssembly `rustup target add wasm32-wasip1`. What is not installed is left out, and said.
-# Recordings are run over their first 40 frames, with the embedded network.
+# Recordings are run over their first 40 frames, with the embedded network. Rendering in qemu takes minutes for each processor.
 set -euo pipefail
 programs=$(realpath "$1")
 shift
@@ -24,9 +24,9 @@ hash_of() {
     local name=$1
     shift
     local out=$work/$name
-    "$@" run 'synth:walking_xyz?frames=30&width=320&height=240&seed=5' --method none,yf,full --out "$out/world" --quiet > "$out.log" 2>&1
-    "$@" run 'synth:walking_xyz?frames=20&width=320&height=240&seed=3' --detector embedded --out "$out/network" --quiet >> "$out.log" 2>&1
-    "$@" run 'synth:walking_xyz?frames=20&width=320&height=240&stereo=0.11' --out "$out/stereo" --quiet >> "$out.log" 2>&1
+    "$@" run 'synth:walking_xyz?frames=20&width=320&height=240&seed=5' --method none,yf,full --out "$out/world" --quiet > "$out.log" 2>&1
+    "$@" run 'synth:walking_xyz?frames=10&width=320&height=240&seed=3' --detector embedded --out "$out/network" --quiet >> "$out.log" 2>&1
+    "$@" run 'synth:walking_xyz?frames=10&width=320&height=240&stereo=0.11' --out "$out/stereo" --quiet >> "$out.log" 2>&1
     local recording
     for recording in ${recordings[@]+"${recordings[@]}"}; do
         "$@" run "$recording" --end 40 --method full --detector embedded --out "$out/$(basename "$recording")" --quiet >> "$out.log" 2>&1
