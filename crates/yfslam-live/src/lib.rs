@@ -9,6 +9,7 @@
 //! ```
 //!
 //! The crate has no sockets, files or threads, and reads no clock: the caller passes the time, so that every test is exact.
+#![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
 mod clock_guard;

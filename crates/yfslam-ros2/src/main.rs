@@ -9,6 +9,7 @@
 //! ```
 //!
 //! The node knows its network by the trait [`transport::Transport`] only. This file has arguments and signals.
+#![forbid(unsafe_code)]
 
 mod convert;
 mod dds;

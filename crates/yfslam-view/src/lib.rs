@@ -10,6 +10,7 @@
 //!
 //! The server binds to the loopback interface unless the caller gives another address. It answers only requests that name it by an address of
 //! the machine, and refuses requests of pages of other origins.
+#![forbid(unsafe_code)]
 
 mod address;
 mod align;
