@@ -62,12 +62,7 @@ impl AtomicFile {
                 Ok(_) => path.canonicalize()?,
                 Err(_) => path.to_owned(),
             };
-            let folder = match target.parent() {
-                Some(folder) if !folder.as_os_str().is_empty() => folder,
-                _ => Path::new("."),
-            };
-            fs::create_dir_all(folder)?;
-            let (temporary, file) = Temporary::create(folder)?;
+            let (temporary, file) = create_beside(&target)?;
             Ok(Self { temporary, writer: BufWriter::with_capacity(1 << 16, file), target })
         };
         create().map_err(|source| Error::write(path, source))
@@ -97,6 +92,17 @@ impl Write for AtomicFile {
     }
 }
 
+/// Creates a temporary file in the folder of `target`, which is created if it is missing.
+fn create_beside(target: &Path) -> io::Result<(Temporary, File)> {
+    let folder = folder_of(target);
+    fs::create_dir_all(folder)?;
+    Temporary::create(folder)
+}
+
+fn folder_of(target: &Path) -> &Path {
+    target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 fn write_or_io_error(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let target = match fs::metadata(path) {
         Ok(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
@@ -104,16 +110,11 @@ fn write_or_io_error(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resu
         Ok(_) => path.canonicalize()?,
         Err(_) => path.to_owned(),
     };
-    let folder = match target.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    fs::create_dir_all(folder)?;
-    let (temporary, file) = Temporary::create(folder)?;
+    let (temporary, file) = create_beside(&target)?;
     write_through(file, write)?;
     temporary.rename_to(&target)?;
     // The new name is on the disk once the folder is; on file systems that cannot do this, only the name may be lost.
-    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    let _ = File::open(folder_of(&target)).and_then(|folder| folder.sync_all());
     Ok(())
 }
 

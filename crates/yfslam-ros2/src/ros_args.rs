@@ -127,14 +127,14 @@ mod tests {
 
     #[test]
     fn the_arguments_of_a_launch_file_are_understood() {
-        let line = "--quiet --ros-args -r __node:=slam -r __ns:=/robot1 --params-file /tmp/p.yaml -p grid:=false -r odom:=wheels -p slam:method:=none --log-level info -- more";
+        let line = "--quiet --ros-args -r __node:=slam -r __ns:=/robot1 --params-file robot.yaml -p grid:=false -r odom:=wheels -p slam:method:=none --log-level info -- more";
         let parsed = parse(line).unwrap();
         assert_eq!((parsed.node.as_deref(), parsed.namespace.as_deref()), (Some("slam"), Some("/robot1")));
         assert_eq!(
             parsed.parameters,
             [("grid".into(), Value::Bool(false)), ("method".into(), Value::Text("none".into()))]
         );
-        assert_eq!((parsed.files, parsed.rest), (vec!["/tmp/p.yaml".into()], vec!["--quiet".into(), "more".into()]));
+        assert_eq!((parsed.files, parsed.rest), (vec!["robot.yaml".into()], vec!["--quiet".into(), "more".into()]));
         for wrong in ["--ros-args -r", "--ros-args -p grid", "--ros-args --magic"] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }

@@ -21,8 +21,6 @@ pub struct Statistics {
     pub keyframes_skipped: usize,
     /// Times that the map was begun anew because tracking was lost soon after the start. Earlier poses belong to another world.
     pub resets: usize,
-    /// Frames that were to be searched for people.
-    pub frames_searched: usize,
     /// Frames on which the detector failed.
     pub detector_failures: usize,
     /// Frames in which nothing searched for people although the filter needs that.

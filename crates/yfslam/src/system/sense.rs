@@ -65,7 +65,6 @@ impl Slam {
     fn start_detector(&mut self, frame: &Frame) -> bool {
         let due = self.detections_are_due(frame.timestamp_ns);
         self.statistics.frames += 1;
-        self.statistics.frames_searched += usize::from(due && self.needs_boxes);
         let roll_deg = self.roll_deg();
         if let Some(detector) = self.detector.as_mut().filter(|_| due && frame.detections.is_none()) {
             detector.start(&frame.color, roll_deg);
@@ -76,8 +75,9 @@ impl Slam {
     /// Returns whether the image of `timestamp_ns` is to be searched for people.
     fn detections_are_due(&mut self, timestamp_ns: i64) -> bool {
         let config = &self.context.config.dynamic;
-        if !self.statistics.frames.is_multiple_of(config.detect_every) {
-            return false;
+        let is_due = self.statistics.frames.is_multiple_of(config.detect_every);
+        if !is_due || config.detect_max_gap_s == 0.0 {
+            return is_due;
         }
         let is_tracking = self.state == TrackingState::Tracking;
         let expected = is_tracking.then(|| self.tracker.predict(self.owner.map()));
