@@ -1,13 +1,10 @@
 //! `report.html`: one well-formed file that loads nothing, with the figures of `run.json`, the same on every run.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use common::{edit_lines, record, report, succeeds};
+use crate::common::{edit_lines, record, report, succeeds};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use serde_json::Value;
@@ -146,7 +143,7 @@ fn the_report_of_a_comparison_is_one_well_formed_file_with_the_figures_of_each_r
         assert!(!without_names.contains(load), "{load}");
     }
     // The improvement is that of equation 3.
-    let rmse = |method: &str| common::ate_rmse(&report(&out.join(method)));
+    let rmse = |method: &str| crate::common::ate_rmse(&report(&out.join(method)));
     let improvement = 100.0 * (1.0 - rmse("yf") / rmse("none"));
     assert!(page.text.contains(&format!("{improvement:.2}").replace('-', "−")), "{improvement}");
 }

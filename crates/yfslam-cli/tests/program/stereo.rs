@@ -1,13 +1,10 @@
 //! Stereo cameras: rendered, recorded, and in the layouts of the EuRoC and KITTI benchmarks.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
-
-mod common;
 
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use common::{ate_rmse, fails, report, succeeds};
+use crate::common::{ate_rmse, fails, report, succeeds};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde_json::Value;
 use yfslam::{Camera, Image, RgbImage};

@@ -1,12 +1,9 @@
 //! `yfslam detect`: boxes as JSON and drawn on images, and errors for images that cannot be read.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{fails, real_data, succeeds, yfslam};
+use crate::common::{fails, real_data, succeeds, yfslam};
 use serde_json::Value;
 use yfslam::RgbImage;
 use yfslam_io::decode::decode_color;

@@ -1,19 +1,10 @@
 //! Classes in dense maps: detected objects have their class, and nothing else has.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    dead_code,
-    reason = "a test may, and it uses a part of what it shares"
-)]
-
-mod common;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::sync::{Arc, Mutex};
 
-use common::succeeds;
+use crate::common::succeeds;
 use nalgebra::{Isometry3, Point3};
 use yfslam::dense::{DenseConfig, DenseMap, Up, Volume, Voxel, classes, voxel_at};
 use yfslam::{Detection, Detector, DetectorError, RgbImage, Slam};

@@ -1,14 +1,10 @@
 //! `yfslam map`: the products can be read by other programs, are the same on every run, and show the world without people.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
-
-mod common;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use common::{fails, succeeds};
+use crate::common::{fails, succeeds};
 use yfslam::Method;
 use yfslam::dense::{DenseConfig, DenseMap, PlacedPatch, Up, Volume};
 use yfslam_bench::dense::background_metrics;

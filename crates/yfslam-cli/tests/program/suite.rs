@@ -1,13 +1,10 @@
 //! The suite in short forms: every world is tracked by the default method, with the same results on every run.
 //! `yfslam bench --seeds 5` is the long form.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::succeeds;
+use crate::common::succeeds;
 use serde_json::Value;
 
 /// Half the size.

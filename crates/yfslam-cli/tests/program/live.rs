@@ -1,14 +1,11 @@
 //! `yfslam live`: a recording at real time, every frame with --lockstep, and frames on standard input.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use common::{fails, record, report, succeeds};
+use crate::common::{fails, record, report, succeeds};
 
 /// The files that a run and a live run of the same frames have in common to the last byte.
 const FILES: [&str; 4] = ["trajectory.txt", "live.txt", "keyframes.txt", "map.ply"];

@@ -1,11 +1,8 @@
 //! The commands `eval`, `ape`, `rpe`, `info`, `demo`, `config`, `completions`, and the help.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 
-use common::{SMALL_WORLD, fails, record, report, succeeds, yfslam};
+use crate::common::{SMALL_WORLD, fails, record, report, succeeds, yfslam};
 use serde_json::Value;
 
 /// A closed curve, displaced by `error_m` to either side in turn.
@@ -99,7 +96,7 @@ fn the_demo_compares_all_methods_and_says_where_the_boxes_come_from() {
         let report = report(&out);
         assert_eq!(report["config"]["dynamic"]["method"], method);
         assert_eq!(report["frames"]["tracked"], 24);
-        errors_m.push(common::ate_rmse(&report));
+        errors_m.push(crate::common::ate_rmse(&report));
     }
     // Without a filter the error is 6.8 to 19 times that of `yf` for the seeds 1 to 5.
     let [none, boxes, yf, full] = errors_m[..] else { unreachable!("four methods") };

@@ -1,13 +1,10 @@
 //! `yfslam bench`: each cell is run once, and the tables have all cells.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use common::{fails, record, succeeds};
+use crate::common::{fails, record, succeeds};
 
 /// A world without people: quick to render, and every method tracks it.
 const EMPTY: &str = "walking_xyz?people=0&width=320&height=240";

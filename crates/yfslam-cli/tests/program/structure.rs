@@ -1,7 +1,5 @@
 //! Dependencies run one way: between the folders of a crate, and between the crates of the workspace. The core's public surface is small.
 
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};

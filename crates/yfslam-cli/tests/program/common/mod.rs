@@ -1,6 +1,4 @@
 //! Runs the program, and writes small recordings for it from the synthetic world.
-#![allow(dead_code, reason = "each test file uses a part")]
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
 pub mod layouts;
 

@@ -1,13 +1,10 @@
 //! Recordings in the layouts of data sets and recorders: each gives the trajectory of the same frames in the layout of TUM.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::layouts::Shots;
-use common::{ate_rmse, edit_lines, fails, real_data, report, succeeds, yfslam};
+use crate::common::layouts::Shots;
+use crate::common::{ate_rmse, edit_lines, fails, real_data, report, succeeds, yfslam};
 use yfslam::Image;
 use yfslam_io::write::write_depth_png;
 

@@ -1,13 +1,11 @@
 //! `yfslam detect` with a network that segments: masks in `boxes.json` and in images.
-#![allow(clippy::unwrap_used, reason = "a test may")]
 
-mod common;
-#[path = "../../yfslam-detect/tests/common/mod.rs"]
+#[path = "../../../yfslam-detect/tests/common/mod.rs"]
 mod networks;
 
 use std::fs;
 
-use common::succeeds;
+use crate::common::succeeds;
 use networks::other::{BOXES, net_with_masks};
 use serde_json::{Value, json};
 use yfslam::RgbImage;

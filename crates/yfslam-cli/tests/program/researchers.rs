@@ -1,13 +1,10 @@
 //! Camera files of other programs in a run, and what `eval` and `convert` offer for trajectories of other systems.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use common::{fails, record, report, succeeds};
+use crate::common::{fails, record, report, succeeds};
 use serde_json::Value;
 
 /// Settings of ORB-SLAM for the camera of the small world, without size and depth factor.

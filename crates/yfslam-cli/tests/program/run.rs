@@ -1,12 +1,9 @@
 //! `yfslam run` on synthetic worlds: accuracy, repeatability, output files.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{SMALL_WORLD, ate_rmse, record, report, succeeds, yfslam};
+use crate::common::{SMALL_WORLD, ate_rmse, record, report, succeeds, yfslam};
 
 /// People who walk through the image; small enough to be quick.
 const WALKING: &str = "synth:walking_xyz?people=2&share=0.3&width=320&height=240&frames=40";

@@ -1,11 +1,8 @@
 //! Recorded sequences, if they are available: accuracy, and memory.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 
-use common::{ate_rmse, real_data, report, succeeds};
+use crate::common::{ate_rmse, real_data, report, succeeds};
 use serde_json::Value;
 
 const MODEL: &str = "models/yolo-fastestv2-coco.onnx";

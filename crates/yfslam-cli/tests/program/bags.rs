@@ -1,15 +1,12 @@
 //! `yfslam run` and `yfslam info` with bags: the same frames give the same trajectory as a folder, to the byte.
-#![allow(clippy::unwrap_used, reason = "a test may")]
 
-#[path = "../../yfslam-io/tests/common/bags.rs"]
-mod bags;
-mod common;
-
+#[path = "../../../yfslam-io/tests/common/bags.rs"]
+mod writer;
 use std::fs;
 use std::path::Path;
 
-use bags::{CDR, COLOR, DEPTH, FRAME, Form, INFO, Message, NONE, ROS1, camera_info, mcap_bag, ros1_bag};
-use common::{ate_rmse, fails, record, report, succeeds};
+use crate::common::{ate_rmse, fails, record, report, succeeds};
+use writer::{CDR, COLOR, DEPTH, FRAME, Form, INFO, Message, NONE, ROS1, camera_info, mcap_bag, ros1_bag};
 use yfslam_io::message::types::Transform;
 use yfslam_io::{CameraSource, FrameStream, Sequence, SequenceOptions, detect_camera};
 

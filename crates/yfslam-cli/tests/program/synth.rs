@@ -1,12 +1,9 @@
 //! `yfslam synth`: the written recording equals the rendered world.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{ate_rmse, fails, report, succeeds};
+use crate::common::{ate_rmse, fails, report, succeeds};
 use serde_json::Value;
 use yfslam_synth::{World, parse_with_camera};
 

@@ -1,12 +1,9 @@
 //! `yfslam run --masks`: masks of movable objects from a folder of images.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{ate_rmse, fails, record, report, succeeds};
+use crate::common::{ate_rmse, fails, record, report, succeeds};
 use yfslam::Image;
 use yfslam_io::write::{write_color_png, write_depth_png};
 

@@ -1,12 +1,9 @@
 //! A single camera: depth comes from motion only, and the scale is arbitrary.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::sync::OnceLock;
 
-use common::{ate_rmse, fails, report, succeeds};
+use crate::common::{ate_rmse, fails, report, succeeds};
 use nalgebra::{Rotation3, Vector3};
 use yfslam::config::DepthSource;
 use yfslam::{Camera, Config, Frame, LoopClosure, Method, RgbImage, Slam};

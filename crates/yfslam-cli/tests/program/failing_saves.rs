@@ -1,8 +1,4 @@
 //! Outputs that cannot be written, and standard streams that are not read: everything else is written all the same.
-#![cfg(unix)]
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Read;
@@ -10,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{fails, record, report, succeeds, yfslam};
+use crate::common::{fails, record, report, succeeds, yfslam};
 use tempfile::TempDir;
 
 const RUN: [&str; 6] = ["run", "seq", "--method", "none", "--out", "out"];

@@ -1,12 +1,9 @@
 //! Several methods in one run: each has the results of a separate run.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{ate_rmse, fails, record, report, succeeds};
+use crate::common::{ate_rmse, fails, record, report, succeeds};
 
 /// People who walk through the image; small enough to be quick.
 const WALKING: &str = "synth:walking_xyz?people=2&share=0.3&width=320&height=240&frames=30";

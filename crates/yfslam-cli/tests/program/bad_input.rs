@@ -1,12 +1,9 @@
 //! Faulty input: an error with file, value and what to do, or a skipped frame that is counted.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::{SMALL_WORLD, edit_lines, fails, record, report, succeeds};
+use crate::common::{SMALL_WORLD, edit_lines, fails, record, report, succeeds};
 use tempfile::TempDir;
 use yfslam::Image;
 use yfslam_io::write::{write_color_png, write_depth_png};

@@ -1,11 +1,8 @@
 //! Faults of camera and driver: the run ends normally, every frame is counted, and the camera is relocalised or lost.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::path::Path;
 
-use common::{fails, report, succeeds};
+use crate::common::{fails, report, succeeds};
 use serde_json::Value;
 
 /// 45 frames in 1.5 s; 12 of them have the fault.

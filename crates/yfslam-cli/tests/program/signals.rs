@@ -1,15 +1,11 @@
 //! SIGINT, SIGTERM and SIGKILL: what is computed is kept, and what is half-made goes away.
-#![cfg(unix)]
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs::{self, File};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{report, succeeds};
+use crate::common::{report, succeeds};
 use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
 use yfslam::SavedMap;

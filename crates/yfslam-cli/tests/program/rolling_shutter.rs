@@ -1,9 +1,6 @@
 //! A rolling shutter that is known costs no accuracy: the camera is tracked as with a global shutter.
-#![allow(clippy::unwrap_used, reason = "a test may")]
 
-mod common;
-
-use common::{ate_rmse, report, succeeds};
+use crate::common::{ate_rmse, report, succeeds};
 
 /// A camera that turns, without noise of the sensor.
 const WORLD: &str = "synth:walking_rpy?people=0&width=400&height=300&frames=240&noise=off";

@@ -1,13 +1,10 @@
 //! `yfslam calibrate`: the shutter of a synthetic camera is found from its images alone, or the command says that it is uncertain.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use common::{fails, record, report, succeeds, yfslam};
+use crate::common::{fails, record, report, succeeds, yfslam};
 use tempfile::TempDir;
 use yfslam_io::{CameraSource, load_camera};
 

@@ -1,14 +1,11 @@
 //! Relocalisation, loop closing, saved maps, and mapping on its own thread.
-#![allow(clippy::unwrap_used, reason = "a test may")]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{ate_rmse, fails, report, succeeds};
+use crate::common::{ate_rmse, fails, report, succeeds};
 use yfslam::SavedMap;
 use yfslam_io::write_atomically;
 
