@@ -7,6 +7,7 @@ use recall::{Table, measure, official_detector};
 use yfslam_synth::{World, parse};
 
 #[test]
+#[ignore = "long: see CONTRIBUTING.md"]
 fn the_official_detector_finds_six_of_ten_people_taller_than_thirty_percent_of_the_image() {
     let Some(mut detector) = official_detector() else {
         eprintln!("skipped: no official model; set YFSLAM_DATA to a folder that has models/yolo-fastestv2-coco.onnx");

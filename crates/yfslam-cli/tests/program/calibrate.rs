@@ -62,6 +62,7 @@ fn a_rolling_shutter_is_found_within_2_ms_and_its_camera_file_is_used_by_a_run()
 }
 
 #[test]
+#[ignore = "long: see CONTRIBUTING.md"]
 fn a_recording_in_reverse_has_the_same_shutter_in_its_camera_file() {
     let args = ["rolling", "--reverse", "--no-delay"];
     let Some(source) = calibrated(rolling(), &args, "reverse.toml") else { return };
@@ -70,6 +71,7 @@ fn a_recording_in_reverse_has_the_same_shutter_in_its_camera_file() {
 }
 
 #[test]
+#[ignore = "long: see CONTRIBUTING.md"]
 fn a_global_shutter_without_delay_is_written_as_0_and_without_a_file_the_camera_is_printed() {
     let folder = turning("global", 0.0);
     let args = ["calibrate", "global", "--end", "100"];

@@ -179,6 +179,7 @@ fn mapped(world: &World, method: Method) -> (DenseMap, Volume) {
 }
 
 #[test]
+#[ignore = "long: see CONTRIBUTING.md"]
 fn walking_people_leave_no_ghosts_and_walls_are_where_they_should_be() {
     let world = world("synth:walking_xyz?width=320&height=240&frames=150");
     let of = |method| {
@@ -205,6 +206,7 @@ fn walking_people_leave_no_ghosts_and_walls_are_where_they_should_be() {
 }
 
 #[test]
+#[ignore = "long: see CONTRIBUTING.md"]
 fn after_a_loop_walls_observed_twice_are_as_thin_as_without_drift() {
     let world = world("synth:corridor_loop?people=0&frames=440&fps=10&width=320&height=240");
     let config = DenseConfig::default();

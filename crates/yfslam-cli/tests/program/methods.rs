@@ -63,6 +63,7 @@ fn methods_that_share_a_detector_give_the_results_of_separate_runs() {
 }
 
 #[test]
+#[ignore = "long: see CONTRIBUTING.md"]
 fn images_of_a_rolled_camera_are_turned_upright_for_the_detector_for_one_method_and_for_several() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
@@ -197,6 +198,7 @@ const CHAIR: &str = "synth:pushed_chair?width=320&height=240&fps=15";
 const STATIC: &str = "synth:walking_static?width=320&height=240&fps=15&frames=40";
 
 #[test]
+#[ignore = "long: see CONTRIBUTING.md"]
 fn dyna_drops_people_with_and_without_boxes_and_ds_needs_the_boxes() {
     let folder = tempfile::tempdir().unwrap();
     let of = |out: &str, method: &str| report(&folder.path().join(out).join(method));

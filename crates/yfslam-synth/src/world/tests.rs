@@ -75,6 +75,7 @@ fn clearance(world: &World, time: f64) -> f32 {
 }
 
 #[test]
+#[ignore = "long: see CONTRIBUTING.md"]
 fn no_person_or_moved_object_of_the_suite_comes_closer_to_the_camera_than_35_cm() {
     assert_eq!(distance(&Vec3::new(0.2, 0.2, 0.3), [Vec3::zeros(), Vec3::x(), Vec3::y()]), 0.3);
     assert_eq!(distance(&Vec3::new(-3.0, 0.5, 4.0), [Vec3::zeros(), Vec3::x(), Vec3::y()]), 5.0);
@@ -97,6 +98,7 @@ fn no_person_or_moved_object_of_the_suite_comes_closer_to_the_camera_than_35_cm(
 }
 
 #[test]
+#[ignore = "long: see CONTRIBUTING.md"]
 fn actors_cover_a_twentieth_of_the_image_in_every_world_of_the_suite() {
     for name in crate::names() {
         for form in ["seed=1&frames=150", "seed=2"] {
