@@ -1,5 +1,7 @@
 //! Changes of the map. Each operation preserves the invariants of [`crate::map`] and ignores ids of removed items.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use slotmap::SecondaryMap;
 
@@ -27,7 +29,7 @@ impl Map {
             sequence,
             t_cam_world,
             unit: 1.0,
-            features,
+            features: Arc::new(features),
             landmarks,
             covisible: Vec::new(),
             parent: None,
@@ -176,7 +178,7 @@ impl Map {
     /// Sets how the rows of the images of a keyframe were read.
     pub(crate) fn set_row_times(&mut self, keyframe: KeyFrameId, times: &FrameTimes) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
-            k.features.set_row_times(times);
+            Arc::make_mut(&mut k.features).set_row_times(times);
         }
     }
 
@@ -189,8 +191,9 @@ impl Map {
         depth_of: impl Fn(usize) -> f64,
     ) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
-            k.features.move_to_middle_row(velocity, pinhole, depth_of);
-            k.features.build_grid();
+            let features = Arc::make_mut(&mut k.features);
+            features.move_to_middle_row(velocity, pinhole, depth_of);
+            features.build_grid();
         }
     }
 

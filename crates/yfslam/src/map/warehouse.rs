@@ -56,7 +56,7 @@ impl Warehouse {
         let mut points = Vec::new();
         for pose in &truth[..round] {
             for _ in 0..POINTS {
-                let side = if rng.next_u32() % 2 == 0 { 1.0 } else { -1.0 };
+                let side = if rng.next_u32().is_multiple_of(2) { 1.0 } else { -1.0 };
                 let [a, b, c] = [0; 3].map(|_| uniform(&mut rng));
                 points.push(pose.inverse() * Point3::new(side * (1.6 + 0.4 * a), 2.0 * b - 1.2, STEP_M * c));
             }
@@ -185,20 +185,15 @@ fn path(keyframes: usize) -> Vec<Pose> {
 fn drive_back(poses: &[Pose], quarter: f64) -> Vec<Pose> {
     let Some(last) = poses.last() else { return Vec::new() };
     let from = last.inverse().translation.vector;
-    let to = Vector3::new(-3.0, 0.0, -4.0);
-    let mut rest = Vec::new();
-    let along = to - from;
+    // The last turn has the radius of the turn before.
+    let radius = 5.0 / quarter;
+    let along = Vector3::new(radius, 0.0, -radius) - from;
     let steps = (along.norm() / STEP_M) as usize;
-    let heading = along.x.atan2(along.z);
-    for i in 1..=steps {
-        let at = from + along * (i as f64 / steps as f64);
-        rest.push((at, heading));
-    }
-    let end = Vector3::zeros();
-    for i in 1..13 {
-        let t = f64::from(i) / 13.0;
-        let turned = heading + (4.0 * quarter - heading) % (4.0 * quarter) * t;
-        rest.push((to + (end - to) * t, turned));
+    let mut rest: Vec<(Vector3<f64>, f64)> =
+        (1..=steps).map(|i| (from + along * (i as f64 / steps as f64), -quarter)).collect();
+    for i in 1..10 {
+        let heading = -quarter * (1.0 - f64::from(i) / 10.0);
+        rest.push((Vector3::new(radius * (1.0 - heading.cos()), 0.0, radius * heading.sin()), heading));
     }
     let pose = |(at, heading): (Vector3<f64>, f64)| {
         let rotation = se3_exp(&Vector6::new(0.0, 0.0, 0.0, 0.0, heading, 0.0));
