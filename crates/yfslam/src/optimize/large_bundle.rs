@@ -357,7 +357,11 @@ mod tests {
                 let [u, v] = camera.project(&p);
                 let weight_disparity = if i % 3 == 0 { 0.0 } else { 4.0 };
                 let measurement = Measurement { u, v, disparity: camera.bf / p.z, weight_px: 1.0, weight_disparity };
-                views.push(View { pose: k, measurement, trust: if (i as usize + k) % 7 == 0 { 0.0 } else { 1.0 } });
+                views.push(View {
+                    pose: k,
+                    measurement,
+                    trust: if (i as usize + k).is_multiple_of(7) { 0.0 } else { 1.0 },
+                });
             }
             start.push(views.len());
         }
