@@ -4,6 +4,8 @@
 //! that the same frames give the same bits. [`Execution::Threaded`] does it beside tracking, which reads the map as it was after the last
 //! finished keyframe; while one is under way no other is taken, so no queue grows. Both run the same [`Backend`].
 
+#[cfg(test)]
+mod growth;
 mod mapping_worker;
 
 use std::sync::{Arc, Mutex, PoisonError};

@@ -122,7 +122,7 @@ impl LoopCorrection {
         let Context { sensor, config } = context;
         let Some(root) = map.root(keyframe) else { return };
         let members = map.submap(root);
-        // In temporal order the matrix of the equations is almost banded. The root, which defines the world, is fixed.
+        // The root, which defines the world, is fixed.
         let mut order: Vec<(bool, u64, KeyFrameId)> =
             members.iter().filter_map(|id| Some((*id != root, map.keyframe(*id)?.sequence, *id))).collect();
         order.sort_unstable();
@@ -151,16 +151,24 @@ impl LoopCorrection {
             }
         }
         graph.solve(&config.pose_graph, !sensor.measures_depth);
-        for id in map.landmarks_of(&members) {
+        let landmarks = map.landmarks_of(&members);
+        for &id in &landmarks {
             let Some(landmark) = map.landmark(id) else { continue };
             let anchor = self.moved_landmarks.get(id).copied().unwrap_or(landmark.reference);
             let (Some(base), Some(&i)) = (base(anchor), index.get(anchor)) else { continue };
             let position = graph.poses[i].inverse() * (base * landmark.position);
             map.set_position(id, position);
-            map.update_landmark(id, &sensor.scale_factors);
         }
         for (id, pose) in order.iter().zip(&graph.poses) {
             map.set_scaled_pose(*id, pose);
+        }
+        // Only the near side got or lost observations.
+        let near = map.landmarks_of(&self.near);
+        for id in landmarks {
+            match near.binary_search(&id) {
+                Ok(_) => map.update_landmark(id, &sensor.scale_factors),
+                Err(_) => map.update_view_range(id, &sensor.scale_factors),
+            }
         }
     }
 }

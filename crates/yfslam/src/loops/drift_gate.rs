@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn there_is_no_path_between_submaps() {
         let (mut map, ids) = line(3);
-        let features = map.keyframe(ids[0]).unwrap().features.clone();
+        let features = crate::features::FrameFeatures::clone(&map.keyframe(ids[0]).unwrap().features);
         let separate = map.insert_keyframe(9, Pose::identity(), features);
         assert_eq!(path_length_m(&map, ids[0], separate), None);
     }

@@ -1,5 +1,5 @@
 //! Global bundle adjustment of a submap after a loop (ORB-SLAM2, IEEE T-RO 2017, section III-C), on a copy, so that mapping can
-//! continue meanwhile.
+//! continue meanwhile. Of a large submap only the part around the loop is adjusted, which bounds time and memory.
 //!
 //! In: the map when the loop was closed; later, the map as it has become. Out: that map, adjusted. Keyframes and landmarks that
 //! were added meanwhile move with their parent or reference keyframe.
@@ -10,57 +10,144 @@ use crate::config::BundleConfig;
 use crate::context::SensorModel;
 use crate::geometry::Pose;
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::mapping::Window;
+use crate::optimize::large_bundle::{LargeBundle, View};
 
-/// A copy of a submap for adjustment.
+/// Most keyframes that are adjusted.
+const MAX_KEYFRAMES: usize = 1200;
+
+/// A copy of the part of a submap that is adjusted.
 #[derive(Clone, Debug)]
 pub(crate) struct GlobalBundle {
-    window: Window,
-    root: KeyFrameId,
+    bundle: LargeBundle,
+    /// Keyframe of each pose.
+    keyframes: Vec<KeyFrameId>,
+    /// Landmark of each point, in the order of their ids.
+    landmarks: Vec<LandmarkId>,
+    /// Sequence number of the next keyframe when the copy was made.
+    next_sequence: u64,
 }
 
 impl GlobalBundle {
-    /// Copies the submap of `keyframe`. `None` if the map does not have it.
+    /// Copies the submap of `keyframe`, or the part around it. `None` if the map does not have it.
     pub(crate) fn copy(sensor: &SensorModel, map: &Map, keyframe: KeyFrameId) -> Option<Self> {
         let root = map.root(keyframe)?;
-        Some(Self { window: Window::whole(sensor, map, root), root })
+        let mut keyframes = around(map, keyframe);
+        // The root defines the world frame and is never adjusted.
+        keyframes.retain(|id| *id != root);
+        let landmarks = map.landmarks_of(&keyframes);
+        let free_poses = keyframes.len();
+        let mut index: SecondaryMap<KeyFrameId, usize> = keyframes.iter().enumerate().map(|(i, id)| (*id, i)).collect();
+        let mut bundle = LargeBundle {
+            camera: sensor.pinhole,
+            poses: keyframes.iter().filter_map(|id| map.keyframe(*id)).map(|k| k.t_cam_world).collect(),
+            free_poses,
+            points: Vec::new(),
+            views: Vec::new(),
+            start: vec![0],
+        };
+        let mut copied = Vec::new();
+        for id in landmarks {
+            // A landmark with one observation says nothing about the poses; it moves with its keyframe.
+            let Some(landmark) = map.landmark(id).filter(|l| l.observations.len() > 1) else { continue };
+            for &(k, f) in &landmark.observations {
+                let Some(keyframe) = map.keyframe(k) else { continue };
+                let pose = *index.entry(k)?.or_insert_with(|| {
+                    keyframes.push(k);
+                    bundle.poses.push(keyframe.t_cam_world);
+                    keyframes.len() - 1
+                });
+                let feature = &keyframe.features.features[f as usize];
+                let trust = f64::from(feature.trust * landmark.trust());
+                bundle.views.push(View { pose, measurement: sensor.measurement(feature), trust });
+            }
+            bundle.points.push(landmark.position);
+            bundle.start.push(bundle.views.len());
+            copied.push(id);
+        }
+        Some(Self { bundle, keyframes, landmarks: copied, next_sequence: map.keyframes_ever() })
     }
 
     /// Adjusts the copy for as long as `go_on` returns true.
     pub(crate) fn adjust(&mut self, config: &BundleConfig, go_on: &dyn Fn() -> bool) {
-        self.window.adjust_while(config, go_on);
+        self.bundle.adjust(config, go_on);
     }
 
-    /// Merges the adjusted poses and points into the map.
+    /// Merges the adjusted poses and points into the map. Items that the map no longer contains are skipped.
     pub(crate) fn merge(self, sensor: &SensorModel, map: &mut Map) {
-        let members = map.submap(self.root);
-        let before: SecondaryMap<KeyFrameId, Pose> =
-            members.iter().filter_map(|id| Some((*id, map.keyframe(*id)?.t_cam_world))).collect();
-        let copied: SecondaryMap<KeyFrameId, ()> = self.window.keyframes().iter().map(|id| (*id, ())).collect();
-        let copied_landmarks = self.window.landmarks().to_vec();
-        self.window.merge(sensor, map);
-        // The motion from a keyframe's old world to its new one.
-        let world_motion = |map: &Map, id: KeyFrameId| Some(map.keyframe(id)?.t_cam_world.inverse() * before.get(id)?);
-        for &id in members.iter().filter(|id| !copied.contains_key(**id)) {
-            let mut anchor = map.keyframe(id).and_then(|k| k.parent);
-            while let Some(ancestor) = anchor.filter(|ancestor| !copied.contains_key(*ancestor)) {
-                anchor = map.keyframe(ancestor).and_then(|k| k.parent);
-            }
-            let motion: Option<Pose> = anchor.and_then(|anchor| world_motion(map, anchor));
-            if let (Some(motion), Some(old)) = (motion, before.get(id)) {
-                map.set_pose(id, old * motion.inverse());
+        let Self { bundle, keyframes, landmarks, next_sequence } = self;
+        let mut before: SecondaryMap<KeyFrameId, Pose> = SecondaryMap::new();
+        for (id, pose) in keyframes.iter().zip(&bundle.poses).take(bundle.free_poses) {
+            if let Some(k) = map.keyframe(*id) {
+                before.insert(*id, k.t_cam_world);
+                map.set_pose(*id, *pose);
             }
         }
-        let is_new = |id: &LandmarkId| copied_landmarks.binary_search(id).is_err();
-        for id in map.landmarks_of(&members).into_iter().filter(is_new) {
+        move_later_keyframes(map, &mut before, next_sequence);
+        for ((id, position), range) in landmarks.iter().zip(&bundle.points).zip(bundle.start.windows(2)) {
+            map.set_position(*id, *position);
+            let wrong = bundle.views[range[0]..range[1]].iter().filter(|view| view.trust <= 0.0);
+            let wrong: Vec<usize> = wrong.map(|view| view.pose).collect();
+            wrong.iter().for_each(|pose| map.remove_observation(*id, keyframes[*pose]));
+            if wrong.is_empty() {
+                map.update_view_range(*id, &sensor.scale_factors);
+            } else {
+                map.update_landmark(*id, &sensor.scale_factors);
+            }
+        }
+        let moved: Vec<KeyFrameId> = before.keys().collect();
+        for id in map.landmarks_of(&moved).into_iter().filter(|id| landmarks.binary_search(id).is_err()) {
             let Some(landmark) = map.landmark(id) else { continue };
-            if let Some(motion) = world_motion(map, landmark.reference) {
+            if let Some(motion) = world_motion(map, &before, landmark.reference) {
                 let position = motion * landmark.position;
                 map.set_position(id, position);
-                map.update_landmark(id, &sensor.scale_factors);
+            }
+            map.update_view_range(id, &sensor.scale_factors);
+        }
+    }
+}
+
+/// Returns the motion from a moved keyframe's old world to its new one.
+fn world_motion(map: &Map, before: &SecondaryMap<KeyFrameId, Pose>, id: KeyFrameId) -> Option<Pose> {
+    Some(map.keyframe(id)?.t_cam_world.inverse() * before.get(id)?)
+}
+
+/// Moves the keyframes that were added since the copy was made, oldest first, with their parents.
+fn move_later_keyframes(map: &mut Map, before: &mut SecondaryMap<KeyFrameId, Pose>, next_sequence: u64) {
+    let mut later: Vec<(u64, KeyFrameId)> =
+        map.keyframes().filter(|(_, k)| k.sequence >= next_sequence).map(|(id, k)| (k.sequence, id)).collect();
+    later.sort_unstable();
+    for (_, id) in later {
+        let Some(k) = map.keyframe(id) else { continue };
+        let old = k.t_cam_world;
+        // A merge of submaps can have made a later keyframe the parent, which moves with an ancestor itself.
+        let mut ancestors = std::iter::successors(k.parent, |id| map.keyframe(*id)?.parent);
+        let is_settled =
+            |id: &KeyFrameId| before.contains_key(*id) || map.keyframe(*id).is_some_and(|k| k.sequence < next_sequence);
+        let motion = ancestors.find(is_settled).and_then(|ancestor| world_motion(map, before, ancestor));
+        if let Some(motion) = motion {
+            before.insert(id, old);
+            map.set_pose(id, old * motion.inverse());
+        }
+    }
+}
+
+/// Returns the keyframes of the submap, or those that the fewest steps in the graph of the map separate from `keyframe`, in the order of time.
+fn around(map: &Map, keyframe: KeyFrameId) -> Vec<KeyFrameId> {
+    let mut found = vec![keyframe];
+    let mut is_found: SecondaryMap<KeyFrameId, ()> = SecondaryMap::new();
+    is_found.insert(keyframe, ());
+    let mut at = 0;
+    while let Some(k) = found.get(at).and_then(|id| map.keyframe(*id)) {
+        at += 1;
+        let edges = k.loop_edges.iter().chain(&k.parent).chain(&k.children);
+        for &other in edges.chain(k.covisible.iter().map(|(id, _)| id)) {
+            if found.len() <= MAX_KEYFRAMES && is_found.insert(other, ()).is_none() {
+                found.push(other);
             }
         }
     }
+    found.sort_by_key(|id| map.keyframe(*id).map(|k| k.sequence));
+    found
 }
 
 #[cfg(test)]

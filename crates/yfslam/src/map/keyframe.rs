@@ -1,5 +1,7 @@
 //! Keyframes: frames that stay in the map.
 
+use std::sync::Arc;
+
 use crate::features::FrameFeatures;
 use crate::geometry::Pose;
 use crate::map::LandmarkId;
@@ -20,8 +22,8 @@ pub struct KeyFrame {
     pub t_cam_world: Pose,
     /// Unit of length at the time of its insertion, in the present unit of the map: 1, unless a loop changed the scale of a map without depth.
     pub unit: f64,
-    /// Features.
-    pub features: FrameFeatures,
+    /// Features; copies of the map share them.
+    pub features: Arc<FrameFeatures>,
     /// Landmark observed by each feature.
     pub landmarks: Vec<Option<LandmarkId>>,
     /// Covisible keyframes with the number of shared landmarks, in descending order.

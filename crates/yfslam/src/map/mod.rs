@@ -25,6 +25,8 @@ mod restore;
 #[cfg(test)]
 pub(crate) mod scene;
 mod submap;
+#[cfg(test)]
+pub(crate) mod warehouse;
 
 use std::collections::BTreeMap;
 

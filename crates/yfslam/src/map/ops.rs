@@ -1,10 +1,12 @@
 //! Changes of the map. Each operation preserves the invariants of [`crate::map`] and ignores ids of removed items.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use slotmap::SecondaryMap;
 
-use crate::features::FrameFeatures;
 use crate::features::rolling_shutter::{FrameTimes, Velocity};
+use crate::features::{Descriptor, FrameFeatures};
 use crate::geometry::{Pinhole, Pose, Similarity, rigid};
 use crate::map::{KeyFrame, KeyFrameId, Landmark, LandmarkId, Map};
 
@@ -27,7 +29,7 @@ impl Map {
             sequence,
             t_cam_world,
             unit: 1.0,
-            features,
+            features: Arc::new(features),
             landmarks,
             covisible: Vec::new(),
             parent: None,
@@ -125,22 +127,10 @@ impl Map {
 
     /// Updates descriptor, normal and distance range of a landmark from its observations.
     pub(crate) fn update_landmark(&mut self, landmark: LandmarkId, scale_factors: &[f32]) {
+        self.update_view_range(landmark, scale_factors);
         let Some(l) = self.landmarks.get(landmark) else { return };
-        let mut normal = Vector3::zeros();
-        let mut descriptors = Vec::with_capacity(l.observations.len());
-        for &(k, f) in &l.observations {
-            let keyframe = &self.keyframes[k];
-            let center = keyframe.t_cam_world.inverse_transform_point(&Point3::origin());
-            normal += (l.position - center).normalize();
-            descriptors.push(keyframe.features.descriptors[f as usize]);
-        }
-        // `remove_observation` replaces a reference that is removed, so both exist unless the map is inconsistent.
-        let (Some(reference), Some(feature)) = (self.keyframes.get(l.reference), l.feature_in(l.reference)) else {
-            return;
-        };
-        let octave = usize::from(reference.features.features[feature].octave);
-        let center = reference.t_cam_world.inverse_transform_point(&Point3::origin());
-        let distance = (l.position - center).norm();
+        let descriptors: Vec<Descriptor> =
+            l.observations.iter().map(|&(k, f)| self.keyframes[k].features.descriptors[f as usize]).collect();
         let best = descriptors
             .iter()
             .map(|d| {
@@ -151,14 +141,31 @@ impl Map {
             .enumerate()
             .min_by_key(|&(i, median)| (median, i))
             .map(|(i, _)| descriptors[i]);
+        if let Some(best) = best {
+            self.landmarks[landmark].descriptor = best;
+        }
+    }
+
+    /// Updates normal and distance range of a landmark whose position, or the pose of an observing keyframe, has changed.
+    pub(crate) fn update_view_range(&mut self, landmark: LandmarkId, scale_factors: &[f32]) {
+        let Some(l) = self.landmarks.get(landmark) else { return };
+        let mut normal = Vector3::zeros();
+        for &(k, _) in &l.observations {
+            let center = self.keyframes[k].t_cam_world.inverse_transform_point(&Point3::origin());
+            normal += (l.position - center).normalize();
+        }
+        // `remove_observation` replaces a reference that is removed, so both exist unless the map is inconsistent.
+        let (Some(reference), Some(feature)) = (self.keyframes.get(l.reference), l.feature_in(l.reference)) else {
+            return;
+        };
+        let octave = usize::from(reference.features.features[feature].octave);
+        let center = reference.t_cam_world.inverse_transform_point(&Point3::origin());
+        let distance = (l.position - center).norm();
         let scale = |level: usize| f64::from(scale_factors.get(level).copied().unwrap_or(1.0));
         let l = &mut self.landmarks[landmark];
         l.normal = normal.try_normalize(1e-12).unwrap_or_else(Vector3::zeros);
         l.max_distance_m = distance * scale(octave);
         l.min_distance_m = l.max_distance_m / scale(scale_factors.len().saturating_sub(1));
-        if let Some(best) = best {
-            l.descriptor = best;
-        }
     }
 
     /// Sets the position of a landmark (world, m).
@@ -171,7 +178,7 @@ impl Map {
     /// Sets how the rows of the images of a keyframe were read.
     pub(crate) fn set_row_times(&mut self, keyframe: KeyFrameId, times: &FrameTimes) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
-            k.features.set_row_times(times);
+            Arc::make_mut(&mut k.features).set_row_times(times);
         }
     }
 
@@ -184,8 +191,9 @@ impl Map {
         depth_of: impl Fn(usize) -> f64,
     ) {
         if let Some(k) = self.keyframes.get_mut(keyframe) {
-            k.features.move_to_middle_row(velocity, pinhole, depth_of);
-            k.features.build_grid();
+            let features = Arc::make_mut(&mut k.features);
+            features.move_to_middle_row(velocity, pinhole, depth_of);
+            features.build_grid();
         }
     }
 

@@ -1,6 +1,6 @@
-//! Local bundle adjustment (ORB-SLAM2, IEEE T-RO 2017, section III-B), and the problem of global bundle adjustment.
+//! Local bundle adjustment (ORB-SLAM2, IEEE T-RO 2017, section III-B).
 //!
-//! In: a keyframe, or a submap. Out: refined poses and landmarks. The part of the map is copied, adjusted, and written back for all items
+//! In: a keyframe. Out: refined poses and landmarks. The part of the map is copied, adjusted, and written back for all items
 //! that the map still contains, so that the map may change in the meantime.
 
 use std::collections::BTreeMap;
@@ -42,29 +42,6 @@ impl Window {
         outside.sort_by_key(|&(id, count)| (std::cmp::Reverse(count), id));
         keyframes.extend(outside.iter().take(config.window_fixed).map(|(id, _)| *id));
         Some(Self::assemble(sensor, map, keyframes, free_poses, landmarks))
-    }
-
-    /// Copies the whole submap with this root, for global bundle adjustment; all keyframes except the root are adjusted.
-    pub(crate) fn whole(sensor: &SensorModel, map: &Map, root: KeyFrameId) -> Self {
-        let members = map.submap(root);
-        let landmarks = map.landmarks_of(&members);
-        // In the order of time the system is nearly a band matrix. The root is last because it is fixed.
-        let mut keyframes: Vec<(bool, u64, KeyFrameId)> =
-            members.iter().filter_map(|id| Some((*id == root, map.keyframe(*id)?.sequence, *id))).collect();
-        keyframes.sort_unstable();
-        let free_poses = keyframes.len().saturating_sub(1);
-        let keyframes = keyframes.into_iter().map(|(.., id)| id).collect();
-        Self::assemble(sensor, map, keyframes, free_poses, landmarks)
-    }
-
-    /// Returns the keyframes of the window.
-    pub(crate) fn keyframes(&self) -> &[KeyFrameId] {
-        &self.keyframes
-    }
-
-    /// Returns the landmarks of the window, in the order of their ids.
-    pub(crate) fn landmarks(&self) -> &[LandmarkId] {
-        &self.landmarks
     }
 
     fn assemble(

@@ -2,13 +2,12 @@
 //! 7.1), and over Sim(3) if the scale drifts too (Strasdat, Montiel and Davison, RSS 2010). It distributes the error of a loop over the
 //! poses between its ends.
 //!
-//! In: poses, and relative poses measured between pairs of them. Out: the poses with the least squared error. The sparse normal equations
-//! are solved by sparse Cholesky factorisation in the order of the poses, which causes little fill-in for a path with few loops.
+//! In: poses, and relative poses measured between pairs of them. Out: the poses with the least squared error. The time of a step is about
+//! proportional to the number of poses; see [`block_cholesky`](super::block_cholesky).
 
-use nalgebra::{DMatrix, Matrix6, SMatrix, SVector, Vector3, Vector6};
-use nalgebra_sparse::factorization::CscCholesky;
-use nalgebra_sparse::{CooMatrix, CscMatrix};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
 
+use super::block_cholesky::BlockSystem;
 use crate::config::PoseGraphConfig;
 use crate::geometry::{Similarity, Tangent, TangentMap, sim3_adjoint, sim3_perturbed, sim3_tangent, skew};
 
@@ -48,8 +47,11 @@ impl PoseGraph {
         let initial = cost::<D>(&self.poses, &self.edges);
         let mut current = initial;
         let mut lambda = config.initial_damping;
+        let free_poses = self.poses.len().saturating_sub(1);
+        let pairs = self.edges.iter().filter_map(|edge| Some((edge.a.checked_sub(1)?, edge.b.checked_sub(1)?)));
+        let mut system = BlockSystem::new(free_poses, pairs);
         for _ in 0..config.iterations {
-            let Some(candidate) = self.step::<D>(lambda) else {
+            let Some(candidate) = self.step::<D>(&mut system, lambda) else {
                 lambda *= 10.0;
                 continue;
             };
@@ -71,11 +73,11 @@ impl PoseGraph {
     }
 
     /// Returns the poses after one damped Gauss–Newton step in the first `D` parameters of each; `None` if the system is singular.
-    fn step<const D: usize>(&self, lambda: f64) -> Option<Vec<Similarity>> {
+    fn step<const D: usize>(&self, system: &mut BlockSystem<D>, lambda: f64) -> Option<Vec<Similarity>> {
         let n = self.poses.len().checked_sub(1).filter(|n| *n > 0)?;
         let mut diagonal = vec![SMatrix::<f64, D, D>::zeros(); n];
-        let mut rhs = DMatrix::zeros(D * n, 1);
-        let mut system = CooMatrix::new(D * n, D * n);
+        let mut solution = vec![SVector::<f64, D>::zeros(); n];
+        system.clear();
         for edge in &self.edges {
             let e = residual(&self.poses, edge);
             let (left, right) = derivatives(&e);
@@ -85,27 +87,26 @@ impl PoseGraph {
             for (pose, jacobian) in [(edge.a, j_a), (edge.b, j_b)] {
                 if let Some(k) = pose.checked_sub(1) {
                     diagonal[k] += jacobian.transpose() * jacobian;
-                    let mut rows = rhs.fixed_view_mut::<D, 1>(D * k, 0);
-                    rows -= jacobian.transpose() * e;
+                    solution[k] -= jacobian.transpose() * e;
                 }
             }
             if let (Some(a), Some(b)) = (edge.a.checked_sub(1), edge.b.checked_sub(1)) {
-                let block = j_a.transpose() * j_b;
-                system.push_matrix(D * a, D * b, &block);
-                system.push_matrix(D * b, D * a, &block.transpose());
+                system.add(a, b, &(j_a.transpose() * j_b));
             }
         }
         for (k, block) in diagonal.iter_mut().enumerate() {
             for i in 0..D {
                 block[(i, i)] += lambda * block[(i, i)] + 1e-9;
             }
-            system.push_matrix(D * k, D * k, block);
+            system.add(k, k, block);
         }
-        let factor = CscCholesky::factor(&CscMatrix::from(&system)).ok()?;
-        let solution = factor.solve(&rhs);
-        let moved = self.poses[1..].iter().enumerate().map(|(k, pose)| {
+        if !system.factorise() {
+            return None;
+        }
+        system.solve(&mut solution);
+        let moved = self.poses[1..].iter().zip(&solution).map(|(pose, step)| {
             let mut xi = Tangent::zeros();
-            xi.fixed_rows_mut::<D>(0).copy_from(&solution.fixed_view::<D, 1>(D * k, 0));
+            xi.fixed_rows_mut::<D>(0).copy_from(step);
             sim3_perturbed(&xi, pose)
         });
         Some(std::iter::once(self.poses[0]).chain(moved).collect())
