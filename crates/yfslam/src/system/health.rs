@@ -31,9 +31,9 @@ const DEPTH_TOLERANCE: f64 = 0.1;
 const MAX_DEPTH_JUMPED: f64 = 0.5;
 /// Motion in the image that the pose must predict for a pixel to be compared, px, and the change of grey level that it must cause.
 const MIN_FLOW_PX: f64 = 2.0;
-const MIN_CHANGE: i16 = 16;
+const MIN_CHANGE: i16 = 20;
 /// Share of pixels that stand still although the pose moves, and the number of pixels that are compared.
-const MAX_STILL: f64 = 0.4;
+const MAX_STILL: f64 = 0.5;
 const MIN_COMPARED: usize = 60;
 /// A gap in time is this many usual intervals, and at least so long, ns.
 const GAP_INTERVALS: i64 = 5;
@@ -201,13 +201,19 @@ impl HealthCheck {
                 continue;
             }
             let then = |x: usize, y: usize| self.gray.get(y * width + x).map(|g| i16::from(*g));
-            let predicted = then(from[0] as usize, from[1] as usize);
-            let (Some(stood), Some(predicted), Some(seen)) = (then(x, y), predicted, gray.get(x, y)) else { continue };
+            let (Some(stood), Some(seen)) = (then(x, y), gray.get(x, y)) else { continue };
             let seen = i16::from(*seen);
-            let [if_still, if_moved] = [(seen - stood).abs(), (seen - predicted).abs()];
-            if (stood - predicted).abs() >= MIN_CHANGE {
-                still += usize::from(4 * if_still <= if_moved);
-                moved += usize::from(4 * if_moved <= if_still);
+            // The pose is not exact to the pixel: the most similar pixel around counts.
+            let least = |value: i16| {
+                let columns = (from[0] as usize).saturating_sub(1)..(from[0] as usize + 2).min(width);
+                let rows = (from[1] as usize).saturating_sub(1)..(from[1] as usize + 2).min(height);
+                let around = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+                around.filter_map(|(x, y)| then(x, y)).map(|then| (value - then).abs()).min().unwrap_or(0)
+            };
+            if least(stood) >= MIN_CHANGE {
+                let [if_still, if_moved] = [(seen - stood).abs(), least(seen)];
+                still += usize::from(if_moved >= MIN_CHANGE && 4 * if_still <= if_moved);
+                moved += usize::from(if_still >= MIN_CHANGE && 4 * if_moved <= if_still);
             }
         }
         health.stands_still = still + moved >= MIN_COMPARED && still as f64 > MAX_STILL * (still + moved) as f64;
