@@ -19,13 +19,13 @@ fail() {
     failures=$((failures + 1))
 }
 
-# Starts a command, sends the signal after 0 to 2 s, and sets `code`.
+# Starts a command, sends the signal after 0 to 5 s, and sets `code`.
 ended_by() {
     local signal=$1
     shift
     "$program" "$@" > stdout 2> stderr &
     local id=$!
-    sleep "$(printf '%d.%03d' $((RANDOM % 2)) $((RANDOM % 1000)))"
+    sleep "$(printf '%d.%03d' $((RANDOM % 5)) $((RANDOM % 1000)))"
     kill -"$signal" $id 2> /dev/null
     wait $id
     code=$?
