@@ -42,7 +42,7 @@ struct RenderArgs {
 
 #[derive(Args)]
 struct MeasureArgs {
-    /// The topic: all, recordings, synthetic, monocular, stereo, shutter, cost, instructions, dense, loops or ablation.
+    /// The topic: all, recordings, synthetic, monocular, stereo, shutter, cost, instructions, dense, loops, ablation or faults.
     topic: String,
     /// Folder of the recordings, as CONTRIBUTING.md describes it [default: YFSLAM_DATA, else ../shared/data].
     #[arg(long)]

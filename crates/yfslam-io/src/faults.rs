@@ -4,6 +4,7 @@
 //! The same frames and faults always give the same deliveries.
 
 mod false_boxes;
+mod images;
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -15,6 +16,11 @@ use yfslam::{DepthImage, Frame, Image, RgbImage};
 use self::false_boxes::FalseBoxes;
 use crate::error::{Error, Result};
 use crate::time::{format_stamp, parse_stamp_ns};
+
+/// Error of a clock, ns.
+const CLOCK_ERROR_NS: i64 = 10_000_000_000;
+/// Number of frames by which depth is late.
+const LATE_FRAMES: usize = 3;
 
 /// Kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,11 +45,37 @@ pub enum FaultKind {
     Covered,
     /// The detector reports people where nobody is. Another begin gives other boxes.
     FalseBoxes,
+    /// The detector reports nothing.
+    NoBoxes,
+    /// The images are four times too bright.
+    OverExposed,
+    /// The images are blurred along their rows.
+    Blurred,
+    /// The brightness changes from frame to frame.
+    Flicker,
+    /// Spots on the lens cover a quarter of the image.
+    Dirt,
+    /// The dots of an infrared projector are in the image.
+    IrPattern,
+    /// The images have half the size.
+    WrongSize,
+    /// Depth has a noise of up to a fifth.
+    DepthNoise,
+    /// Depth is 1.5 times as large.
+    DepthScale,
+    /// The upper half of the depth image has the largest reading.
+    DepthSaturated,
+    /// The depth image is that of three frames earlier.
+    DepthLate,
+    /// The clock of the camera is ten seconds ahead, and goes back afterwards.
+    ClockAhead,
+    /// The clock of the camera is ten seconds behind, and is right again afterwards.
+    ClockBehind,
 }
 
 impl FaultKind {
     /// All kinds with their names and descriptions.
-    pub const ALL: [(&str, Self, &str); 10] = [
+    pub const ALL: [(&str, Self, &str); 23] = [
         ("dropped", Self::Dropped, "frames are not delivered"),
         ("repeated", Self::Repeated, "frames are delivered twice with the same stamp"),
         ("blank", Self::Blank, "white colour images"),
@@ -58,6 +90,19 @@ impl FaultKind {
             Self::FalseBoxes,
             "up to three boxes of people who are not there, instead of those of the detector",
         ),
+        ("no-boxes", Self::NoBoxes, "a detector that finds nothing"),
+        ("over-exposed", Self::OverExposed, "images that are four times too bright"),
+        ("blurred", Self::Blurred, "images that are blurred along their rows"),
+        ("flicker", Self::Flicker, "a brightness that changes from frame to frame"),
+        ("dirt", Self::Dirt, "spots on the lens, which cover a quarter of the image"),
+        ("ir-pattern", Self::IrPattern, "the dots of an infrared projector in the image"),
+        ("wrong-size", Self::WrongSize, "images of half the size"),
+        ("depth-noise", Self::DepthNoise, "a noise of depth of up to a fifth"),
+        ("depth-scale", Self::DepthScale, "depth that is 1.5 times as large"),
+        ("depth-saturated", Self::DepthSaturated, "the largest reading in the upper half of the depth image"),
+        ("depth-late", Self::DepthLate, "the depth image of three frames earlier"),
+        ("clock-ahead", Self::ClockAhead, "a clock that is ten seconds ahead, and goes back afterwards"),
+        ("clock-behind", Self::ClockBehind, "a clock that is ten seconds behind, and is right again afterwards"),
     ];
 }
 
@@ -129,6 +174,8 @@ pub struct FaultInjector {
     first_ns: i64,
     frozen: Option<Frame>,
     held: Option<Delivery>,
+    /// The depth images of the last frames, the oldest first, if depth will be late.
+    depths: VecDeque<Option<Arc<DepthImage>>>,
     false_boxes: FalseBoxes,
     ready: VecDeque<Delivery>,
 }
@@ -138,7 +185,15 @@ impl FaultInjector {
     pub fn new(faults: Vec<Fault>, first_ns: i64) -> Self {
         let first = faults.iter().find(|fault| fault.kind == FaultKind::FalseBoxes);
         let false_boxes = FalseBoxes::new(first.map_or(0, |fault| fault.start_ns as u64));
-        Self { faults, first_ns, frozen: None, held: None, false_boxes, ready: VecDeque::new() }
+        Self {
+            faults,
+            first_ns,
+            frozen: None,
+            held: None,
+            depths: VecDeque::new(),
+            false_boxes,
+            ready: VecDeque::new(),
+        }
     }
 
     /// Adds the next frame.
@@ -146,6 +201,7 @@ impl FaultInjector {
         let elapsed_ns = frame.timestamp_ns.saturating_sub(self.first_ns);
         let mut delivery = Some(true);
         let (mut twice, mut late, mut frozen) = (false, false, false);
+        let late_depth = self.late_depth(&frame);
         for fault in self.faults.iter().filter(|fault| fault.affects(elapsed_ns)) {
             match fault.kind {
                 FaultKind::Dropped => delivery = None,
@@ -171,6 +227,19 @@ impl FaultInjector {
                     let boxes = self.false_boxes.next(frame.color.width(), frame.color.height());
                     frame.detections.get_or_insert_default().extend_from_slice(boxes);
                 }
+                FaultKind::NoBoxes => frame.detections = Some(Vec::new()),
+                FaultKind::OverExposed => images::over_expose(&mut frame),
+                FaultKind::Blurred => images::blur(&mut frame),
+                FaultKind::Flicker => images::flicker(&mut frame),
+                FaultKind::Dirt => images::cover_with_dirt(&mut frame),
+                FaultKind::IrPattern => images::add_dots(&mut frame),
+                FaultKind::WrongSize => images::halve(&mut frame),
+                FaultKind::DepthNoise => images::add_depth_noise(&mut frame),
+                FaultKind::DepthScale => images::scale_depth(&mut frame),
+                FaultKind::DepthSaturated => images::saturate_depth(&mut frame),
+                FaultKind::DepthLate => frame.depth = late_depth.clone(),
+                FaultKind::ClockAhead => shift_clock(&mut frame, CLOCK_ERROR_NS),
+                FaultKind::ClockBehind => shift_clock(&mut frame, -CLOCK_ERROR_NS),
             }
         }
         if !frozen {
@@ -187,6 +256,18 @@ impl FaultInjector {
         }
         self.ready.push_back(delivery);
         self.finish();
+    }
+
+    /// Keeps the depth image of a frame if depth will be late, and returns the one of some frames earlier.
+    fn late_depth(&mut self, frame: &Frame) -> Option<Arc<DepthImage>> {
+        if !self.faults.iter().any(|fault| fault.kind == FaultKind::DepthLate) {
+            return None;
+        }
+        self.depths.push_back(frame.depth.clone());
+        if self.depths.len() > LATE_FRAMES + 1 {
+            self.depths.pop_front();
+        }
+        self.depths.front().cloned().flatten()
     }
 
     /// Releases a frame that is held back; to be called after the last frame.
@@ -207,6 +288,11 @@ fn repaint(frame: &mut Frame, color: impl Fn(usize) -> [u8; 3]) {
     frame.color = Arc::new(image);
     frame.right = frame.right.as_ref().map(|_| frame.color.clone());
     frame.detections = frame.detections.as_ref().map(|_| Vec::new());
+}
+
+fn shift_clock(frame: &mut Frame, by_ns: i64) {
+    frame.timestamp_ns = frame.timestamp_ns.saturating_add(by_ns);
+    frame.depth_timestamp_ns = frame.depth_timestamp_ns.map(|ns| ns.saturating_add(by_ns));
 }
 
 fn remove_depth(frame: &mut Frame) {

@@ -120,7 +120,8 @@ pub use loops::LoopClosure;
 pub use map::MapError;
 pub use map::{KeyFrame, KeyFrameId, KeyframeRelativePose, Landmark, LandmarkId, Map};
 pub use system::{
-    FrameRejected, MapUse, Readout, SavedMap, SetupError, Slam, SlamBuilder, StageTimes, Statistics, Tracked,
+    FrameHealth, FrameRejected, MapUse, Readout, SavedMap, SetupError, Slam, SlamBuilder, StageTimes, Statistics,
+    Tracked,
 };
 pub use tracking::{LostReason, TrackingStart, TrackingState};
 pub use worker::Execution;

@@ -3,6 +3,7 @@
 pub mod ablation;
 pub mod cost;
 pub mod dense;
+pub mod faults;
 pub mod instructions;
 pub mod loops;
 pub mod monocular;
@@ -80,7 +81,7 @@ pub struct Topic {
 }
 
 /// All topics, in the order of the pages.
-pub const TOPICS: [&Topic; 10] = [
+pub const TOPICS: [&Topic; 11] = [
     &recordings::TOPIC,
     &synthetic::TOPIC,
     &monocular::TOPIC,
@@ -91,6 +92,7 @@ pub const TOPICS: [&Topic; 10] = [
     &dense::TOPIC,
     &loops::TOPIC,
     &ablation::TOPIC,
+    &faults::TOPIC,
 ];
 
 /// The topics of a name, or all of them.

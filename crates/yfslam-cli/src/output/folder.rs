@@ -14,6 +14,7 @@ use super::overlay;
 use super::report::RunReport;
 use crate::input::settings::describe;
 use crate::run::pipeline::Outcome;
+use crate::run::resume::{Checkpoint, Resumed, RunIdentity};
 use crate::ui::failures::Failures;
 
 /// Parent of the output folders of runs without `--out`.
@@ -29,9 +30,12 @@ const LIVE_FILE: &str = "live.txt";
 const LANDMARKS_FILE: &str = "map.ply";
 const RUN_FILE: &str = "run.json";
 const CONFIG_FILE: &str = "config.toml";
+/// The state of a run at a checkpoint, and its map.
+const CHECKPOINT_FILE: &str = "checkpoint.json";
+const CHECKPOINT_MAP_FILE: &str = "checkpoint.map";
 
 /// The results of a run; `config.toml` is no result, and may be the input that repeats the run.
-const RESULT_FILES: [&str; 9] = [
+const RESULT_FILES: [&str; 11] = [
     TRAJECTORY_FILE,
     KEYFRAMES_FILE,
     LIVE_FILE,
@@ -41,6 +45,8 @@ const RESULT_FILES: [&str; 9] = [
     REPORT_FILE,
     DENSE_FILE,
     FAILURE_FILE,
+    CHECKPOINT_FILE,
+    CHECKPOINT_MAP_FILE,
 ];
 
 /// The folder in which `yfslam map` writes, and its files but for those of backgrounds, which are named after keyframes.
@@ -142,6 +148,37 @@ impl OutputFolder {
     pub fn write_poses(&self, trajectory: &[StampedPose], live: &[StampedPose]) -> Result<()> {
         write_trajectory(&self.0.join(TRAJECTORY_FILE), trajectory)?;
         Ok(write_trajectory(&self.0.join(LIVE_FILE), live)?)
+    }
+
+    /// Writes what a later run needs to go on: the map first and the state last, so that a state without its map never is there.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write_checkpoint(&self, checkpoint: &Checkpoint, map: &[u8]) -> Result<()> {
+        write_atomically(&self.0.join(CHECKPOINT_MAP_FILE), |file| file.write_all(map))?;
+        let json = serde_json::to_string(checkpoint)?;
+        Ok(write_atomically(&self.0.join(CHECKPOINT_FILE), |file| writeln!(file, "{json}"))?)
+    }
+
+    /// Reads the checkpoint of the run `run`.
+    ///
+    /// # Errors
+    /// See [`Resumed::read`].
+    pub fn read_checkpoint(&self, run: &RunIdentity) -> Result<Resumed> {
+        Resumed::read(&self.0, run, [CHECKPOINT_FILE, CHECKPOINT_MAP_FILE, TRAJECTORY_FILE, LIVE_FILE])
+    }
+
+    /// Returns the map of the checkpoint.
+    pub fn checkpoint_map(&self) -> PathBuf {
+        self.0.join(CHECKPOINT_MAP_FILE)
+    }
+
+    /// Removes the checkpoint of a run that has ended.
+    ///
+    /// # Errors
+    /// A file cannot be removed.
+    pub fn remove_checkpoint(&self) -> Result<()> {
+        remove_files(&self.0, |name| [CHECKPOINT_FILE, CHECKPOINT_MAP_FILE].contains(&name))
     }
 
     /// Writes trajectories and landmarks.

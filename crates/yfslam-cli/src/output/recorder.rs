@@ -17,6 +17,7 @@ use super::video::Video;
 use crate::run::map_args::MapArgs;
 use crate::run::method_run::{Maps, RunResult};
 use crate::run::pipeline::Pipeline;
+use crate::run::resume::RunIdentity;
 use crate::ui::failures::Failures;
 
 /// What a method run leaves behind besides its trajectory.
@@ -89,12 +90,14 @@ impl Recorder {
         &self.folder
     }
 
-    /// Begins to record: removes the results of an earlier run, and writes the configuration.
+    /// Begins to record: removes the results of an earlier run, unless this one goes on from its checkpoint, and writes the configuration.
     ///
     /// # Errors
     /// A file cannot be removed or written.
-    pub fn begin(&self, config: &Config) -> Result<()> {
-        self.folder.remove_results()?;
+    pub fn begin(&self, config: &Config, resumes: bool) -> Result<()> {
+        if !resumes {
+            self.folder.remove_results()?;
+        }
         self.folder.write_config(config)
     }
 
@@ -145,18 +148,18 @@ impl Recorder {
         }
     }
 
-    /// Writes the trajectories and, if it is to be saved, the map as they are now; nothing if no frame is tracked yet.
+    /// Writes the trajectories and the map as they are now, for a later run that goes on; nothing if no frame is tracked yet.
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn write_checkpoint(&self, pipeline: &mut Pipeline, map: &MapArgs) -> Result<()> {
+    pub fn write_checkpoint(&self, pipeline: &mut Pipeline, map: &MapArgs, run: &RunIdentity) -> Result<()> {
         pipeline.finish_mapping();
         let trajectory = pipeline.trajectory();
-        if trajectory.is_empty() {
-            return Ok(());
-        }
+        let Some(checkpoint) = pipeline.checkpoint(run).filter(|_| !trajectory.is_empty()) else { return Ok(()) };
         self.folder.write_poses(&trajectory, pipeline.live())?;
-        map.encode(pipeline).map_or(Ok(()), |encoded| map.write(&encoded?))
+        let encoded = pipeline.save_map()?;
+        self.folder.write_checkpoint(&checkpoint, &encoded)?;
+        map.write(&encoded)
     }
 
     /// Writes the result but for `run.json`; returns the images for the report.

@@ -12,6 +12,8 @@ use crate::input::boxes::BoxOrigin;
 use crate::input::source::{MaskTally, Source, Truth};
 use crate::run::dense::DenseCost;
 use crate::run::method_run::RunResult;
+use crate::run::resume::ResumePoint;
+use crate::stats::health::HealthTally;
 use crate::stats::process::FrameCost;
 use crate::stats::readout::ReadoutReport;
 use crate::stats::recognition::RecognitionTally;
@@ -58,6 +60,10 @@ pub struct RunReport<'a> {
     pub interrupted: bool,
     /// The association of colour images with depth or right images; `null` for synthetic worlds.
     pub association: Option<Association>,
+    /// Where the run has gone on from a checkpoint; `null` if it began at the first frame.
+    pub resumed: Option<ResumePoint>,
+    /// Signs that the result may be wrong although no stage has reported an error: in how many frames, and when.
+    pub health: &'a HealthTally,
     pub dynamic: &'a DynamicTally,
     /// Loops that were closed, and periods in which the camera was lost.
     pub loops_and_relocalisation: &'a RecognitionTally,
@@ -122,6 +128,8 @@ impl<'a> RunReport<'a> {
             coordinates: Frames::from(&outcome.map_frame),
             interrupted: interrupted.is_some(),
             association: source.association.as_ref().map(Association::from),
+            resumed: outcome.resumed,
+            health: &outcome.health,
             dynamic: &outcome.dynamic,
             loops_and_relocalisation: &outcome.recognition,
             map: MapSize { keyframes: outcome.keyframes.len(), landmarks: outcome.landmarks.len() },

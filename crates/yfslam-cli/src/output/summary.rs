@@ -32,6 +32,9 @@ pub fn of_one(report: &RunReport, run: &ReportedRun) -> Result<String> {
     if let Some(interrupted) = run.interrupted {
         writeln!(text, "{interrupted} after {} of {} frames", frames.total(), source.stamps_ns.len())?;
     }
+    if let Some(resumed) = outcome.resumed {
+        writeln!(text, "{}", resumed.describe())?;
+    }
     if frames.skipped > 0 {
         let reasons: Vec<_> =
             frames.skipped_by_reason.iter().map(|(reason, count)| format!("{count} × {reason}")).collect();
@@ -63,6 +66,9 @@ pub fn of_one(report: &RunReport, run: &ReportedRun) -> Result<String> {
         writeln!(text, "rolling shutter: {}", outcome.readout)?;
     }
     write_recognition(&mut text, &outcome.recognition)?;
+    if let Some(signs) = outcome.health.describe() {
+        writeln!(text, "health: {signs}")?;
+    }
     if let Some(time) = processor_time(std::slice::from_ref(run)) {
         text += &describe_processor_time(&time);
     }

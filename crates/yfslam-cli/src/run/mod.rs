@@ -7,4 +7,5 @@ pub mod evaluation;
 pub mod map_args;
 pub mod method_run;
 pub mod pipeline;
+pub mod resume;
 pub mod shared_detector;

@@ -14,8 +14,10 @@ use yfslam_io::time::format_stamp;
 use yfslam_io::write::PlyPoint;
 
 use super::dense::{DenseCost, DenseResult};
+use super::resume::{Checkpoint, ResumePoint, Resumed, RunIdentity};
 use crate::input::detector::DetectorTime;
 use crate::stats::cpu;
+use crate::stats::health::HealthTally;
 use crate::stats::process::{Part, Parts};
 use crate::stats::readout::ReadoutReport;
 use crate::stats::recognition::{LoadedMap, RecognitionTally};
@@ -31,6 +33,9 @@ pub struct Pipeline {
     frames: FrameTally,
     dynamic: DynamicTally,
     recognition: RecognitionTally,
+    health: HealthTally,
+    /// The checkpoint from which the run goes on.
+    resumed: Option<Resumed>,
     live: Vec<StampedPose>,
     resets: usize,
     /// Patches of the dense map.
@@ -63,6 +68,10 @@ pub struct Outcome {
     pub frames: FrameTally,
     pub dynamic: DynamicTally,
     pub recognition: RecognitionTally,
+    /// Signs that the result may be wrong.
+    pub health: HealthTally,
+    /// Where the run has gone on from a checkpoint.
+    pub resumed: Option<ResumePoint>,
     /// How the readout time of the rows was known at the end.
     pub readout: ReadoutReport,
     pub stages: Stages,
@@ -81,6 +90,8 @@ impl Pipeline {
             frames: FrameTally::default(),
             dynamic: DynamicTally::default(),
             recognition: RecognitionTally::default(),
+            health: HealthTally::default(),
+            resumed: None,
             live: Vec::new(),
             resets: 0,
             dense_patches: 0,
@@ -103,6 +114,21 @@ impl Pipeline {
         self
     }
 
+    /// Goes on from a checkpoint, with whose map the system has begun.
+    pub fn resume(&mut self, resumed: Resumed) {
+        self.frames = resumed.checkpoint.tally.clone();
+        self.health = resumed.checkpoint.health.clone();
+        self.live = resumed.live.clone();
+        self.resumed = Some(resumed);
+    }
+
+    /// Returns the state of the run `run` for a checkpoint; `None` if no frame is tracked yet.
+    pub fn checkpoint(&self, run: &RunIdentity) -> Option<Checkpoint> {
+        let last_ns = self.live.last()?.timestamp_ns;
+        let (run, tally, health) = (run.clone(), self.frames.clone(), self.health.clone());
+        Some(Checkpoint { run, tally, health, last_ns })
+    }
+
     /// Tracks one frame and returns the state after it; a frame that SLAM refuses is counted as skipped.
     pub fn track(&mut self, frame: &Frame) -> TrackingState {
         self.last = None;
@@ -122,7 +148,9 @@ impl Pipeline {
         self.add_stages(&tracked);
         self.frames.count(tracked.state);
         self.dynamic.count(&self.slam);
-        self.recognition.count(&tracked, self.frames.total() - 1);
+        let before = self.resumed.as_ref().map_or(0, |resumed| resumed.checkpoint.tally.total());
+        self.recognition.count(&tracked, self.frames.total().saturating_sub(before + 1));
+        self.health.count(&tracked, &self.recognition);
         if self.slam.statistics().resets > self.resets {
             // A new map has another world frame: earlier poses do not belong to this trajectory.
             self.resets = self.slam.statistics().resets;
@@ -178,7 +206,12 @@ impl Pipeline {
 
     /// Returns the poses of all tracked frames as the map has them now.
     pub fn trajectory(&self) -> Vec<StampedPose> {
-        self.slam.trajectory().into_iter().map(stamped).collect()
+        let new = self.slam.trajectory().into_iter().map(stamped);
+        let Some(resumed) = &self.resumed else { return new.collect() };
+        let earlier = resumed.corrected(self.slam.map());
+        // Where the map of the checkpoint was not recognised, the new poses belong to another world.
+        let is_recognised = self.recognition.loaded_map.as_ref().is_none_or(|map| map.recognised.is_some());
+        earlier.into_iter().chain(new.filter(|_| is_recognised)).collect()
     }
 
     /// Returns the poses of all tracked frames as estimated at their time.
@@ -266,13 +299,13 @@ impl Pipeline {
         self.recognition.frames_in_other_submaps =
             submap_sizes.iter().sum::<usize>() - submap_sizes.iter().max().copied().unwrap_or(0);
         let wall = self.started.elapsed();
-        self.frames.detector_failures = self.slam.statistics().detector_failures;
+        self.frames.detector_failures += self.slam.statistics().detector_failures;
         if self.frames.tracked == 0 {
             self.fail(config)?;
         }
         let map_frame = self.map_frame.or(self.slam.statistics().saved_frame).unwrap_or_default();
         let map = self.slam.map();
-        let first_keyframe = self.slam.statistics().first_keyframe;
+        let first_keyframe = if self.resumed.is_some() { 0 } else { self.slam.statistics().first_keyframe };
         let new_keyframes = map.keyframes().filter(|(_, k)| k.sequence >= first_keyframe);
         let mut keyframes: Vec<_> = new_keyframes.map(|(_, k)| (k.sequence, k.timestamp_ns, k.t_cam_world)).collect();
         keyframes.sort_by_key(|&(sequence, ..)| sequence);
@@ -286,6 +319,8 @@ impl Pipeline {
             frames: self.frames,
             dynamic: self.dynamic,
             recognition: self.recognition,
+            health: self.health,
+            resumed: self.resumed.as_ref().map(Resumed::point),
             readout: self.slam.statistics().readout.into(),
             stages: self.stages,
             wall,

@@ -1,6 +1,7 @@
 //! Figures of a run: counts, durations, processor time.
 
 pub mod cpu;
+pub mod health;
 pub mod process;
 pub mod readout;
 pub mod recognition;

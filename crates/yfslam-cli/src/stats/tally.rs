@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use yfslam::{Slam, TrackingState};
 
 use crate::stats::skip::Skip;
 
 /// Counts of frames.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct FrameTally {
     /// Frames that SLAM processed.
     pub read: usize,
@@ -21,7 +21,7 @@ pub struct FrameTally {
     /// Frames that could not be used.
     pub skipped: usize,
     /// Skipped frames by kind of fault.
-    pub skipped_by_reason: BTreeMap<&'static str, usize>,
+    pub skipped_by_reason: BTreeMap<String, usize>,
     /// Frame, file and fault of the first skipped frame.
     pub first_skipped: Option<String>,
     /// Frames on which the detector failed; they count as frames without boxes.
@@ -47,7 +47,7 @@ impl FrameTally {
     /// Counts a frame that could not be used.
     pub fn skip(&mut self, Skip { reason, message }: Skip) {
         self.skipped += 1;
-        *self.skipped_by_reason.entry(reason).or_default() += 1;
+        *self.skipped_by_reason.entry(reason.to_owned()).or_default() += 1;
         self.first_skipped.get_or_insert(message);
     }
 

@@ -19,6 +19,7 @@ mod detect_masks;
 #[cfg(unix)]
 mod failing_saves;
 mod faults;
+mod health;
 mod html;
 mod layouts;
 mod live;
@@ -29,6 +30,8 @@ mod mono;
 mod real;
 mod recognition;
 mod researchers;
+#[cfg(unix)]
+mod resume;
 mod rolling_shutter;
 mod run;
 #[cfg(unix)]

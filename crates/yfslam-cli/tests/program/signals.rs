@@ -16,11 +16,11 @@ const LONG: &str = "walking_xyz?people=0&width=320&height=240&frames=5000";
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A program at work, which does not outlive the test.
-struct Running(Child);
+pub(crate) struct Running(Child);
 
 impl Running {
     /// Starts the program in `folder`, with its messages in the file `stderr`.
-    fn start(folder: &Path, args: &[&str]) -> Self {
+    pub(crate) fn start(folder: &Path, args: &[&str]) -> Self {
         let stderr = File::create(folder.join("stderr")).unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_yfslam"));
         command.args(args).current_dir(folder).stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
@@ -28,7 +28,7 @@ impl Running {
     }
 
     #[track_caller]
-    fn wait_until(&mut self, what: &str, is_reached: impl Fn() -> bool) {
+    pub(crate) fn wait_until(&mut self, what: &str, is_reached: impl Fn() -> bool) {
         let started = Instant::now();
         while !is_reached() {
             assert_eq!(self.0.try_wait().unwrap(), None, "the program ended before {what}");
@@ -37,12 +37,12 @@ impl Running {
         }
     }
 
-    fn send(&self, signal: Signal) {
+    pub(crate) fn send(&self, signal: Signal) {
         kill_process(Pid::from_child(&self.0), signal).unwrap();
     }
 
     /// Returns the exit code; `None` if a signal ended the program without its doing.
-    fn end(&mut self) -> Option<i32> {
+    pub(crate) fn end(&mut self) -> Option<i32> {
         self.0.wait().unwrap().code()
     }
 }
@@ -54,7 +54,7 @@ impl Drop for Running {
     }
 }
 
-fn poses(file: &Path) -> usize {
+pub(crate) fn poses(file: &Path) -> usize {
     fs::read_to_string(file).unwrap().lines().filter(|line| !line.starts_with('#')).count()
 }
 
@@ -97,6 +97,8 @@ fn a_run_ends_in_order_after_sigint_and_sigterm() {
         }
         let files = [
             "T_map_world.txt",
+            "checkpoint.json",
+            "checkpoint.map",
             "config.toml",
             "keyframes.txt",
             "live.txt",

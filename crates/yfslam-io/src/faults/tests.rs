@@ -81,6 +81,59 @@ fn images_become_white_black_dark_or_frozen() {
 }
 
 #[test]
+fn images_of_worn_or_badly_set_cameras_differ_from_the_true_ones_and_are_the_same_again() {
+    let kinds = ["over-exposed", "blurred", "flicker", "dirt", "ir-pattern"];
+    let textured = |k: i64| {
+        let mut frame = frame(k);
+        let value = |i: usize| [(i * 37 % 200) as u8, (i * 53 % 200) as u8, 90];
+        frame.color = Arc::new(RgbImage::from_vec(64, 48, (0..64 * 48).map(value).collect()).unwrap());
+        frame.right = Some(frame.color.clone());
+        frame
+    };
+    for kind in kinds {
+        let images = || -> Vec<Frame> {
+            let mut injector = FaultInjector::new(vec![format!("{kind}@0+9").parse().unwrap()], frame(0).timestamp_ns);
+            (0..3).for_each(|k| injector.push(textured(k)));
+            std::iter::from_fn(|| injector.pop()).map(|delivery| delivery.frame).collect()
+        };
+        let (once, again) = (images(), images());
+        assert!(once.iter().zip(&again).all(|(a, b)| a.color == b.color), "{kind}");
+        assert!(
+            once.iter().all(|a| a.color != textured(0).color && a.right.as_ref() != Some(&textured(0).color)),
+            "{kind}"
+        );
+        assert_eq!(once[0].color != once[2].color, kind == "flicker", "{kind}: what is on the lens stays where it is");
+    }
+    let half = &deliver(&["wrong-size@0.3+0.1"])[3].frame;
+    assert_eq!((half.color.width(), half.color.height()), (2, 1));
+    assert_eq!(half.depth.as_ref().map(|depth| (depth.raw.width(), depth.raw.height())), Some((2, 1)));
+}
+
+#[test]
+fn depth_becomes_noise_larger_saturated_or_late() {
+    let readings = |kind: &str| -> Vec<u16> {
+        let delivered = deliver(&[&format!("{kind}@0.5+0.1")]);
+        assert_eq!(delivered.iter().map(depth).take(5).collect::<Vec<_>>(), [1000, 1001, 1002, 1003, 1004]);
+        delivered[5].frame.depth.as_ref().unwrap().raw.data().to_vec()
+    };
+    let noise = readings("depth-noise");
+    assert!(noise.iter().all(|v| (804..=1206).contains(v)) && noise.iter().any(|v| v.abs_diff(1005) > 20), "{noise:?}");
+    assert_eq!(readings("depth-scale"), [1507; 8]);
+    assert_eq!(readings("depth-saturated"), [[u16::MAX; 4], [1005; 4]].concat());
+    assert_eq!(readings("depth-late"), [1002; 8]);
+}
+
+#[test]
+fn a_wrong_clock_shifts_all_stamps_and_a_blind_detector_reports_nothing() {
+    let clock = |kind: &str| deliver(&[&format!("{kind}@0.5+0.2")]);
+    assert_eq!(order(&clock("clock-ahead")), [0, 1, 2, 3, 4, 105, 106, 7, 8, 9]);
+    let behind = clock("clock-behind");
+    assert_eq!(order(&behind), [0, 1, 2, 3, 4, -95, -94, 7, 8, 9]);
+    assert!(behind.iter().all(|one| one.frame.depth_timestamp_ns == Some(one.frame.timestamp_ns + 5_000_000)));
+    assert_eq!(deliver(&["no-boxes@0.5+0.1"])[5].frame.detections, Some(Vec::new()));
+}
+
+#[test]
 fn faults_at_the_same_time_add_up() {
     let both = deliver(&["black@0.3+0.1", "depth-dropout@0.3+0.1", "repeated@0.3+0.1"]);
     assert!(both[3..5].iter().all(|d| (grey(d), depth(d)) == (0, 0)));

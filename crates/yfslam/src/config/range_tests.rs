@@ -1,7 +1,7 @@
-//! Short runs with each numeric key at both ends of its range: none may panic or take long.
+//! Short runs of the methods none, yf and full with each numeric key at both ends of its range: none may panic, hang or need much memory.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::thread;
 
 use super::section::{Check, Entry, Number, Section};
 use super::{Config, DepthSource, Method};
@@ -56,38 +56,54 @@ fn run(config: Config, frames: &[Frame], with_dense: bool) -> usize {
 }
 
 /// The default configuration for a section's sensor, with a method that needs no detector where there is no depth image.
-fn base(section: &str) -> Config {
+fn base(section: &str, method: Method) -> Config {
     let mut config = Config::default();
     (config.depth.source, config.dynamic.method) = match section {
         "stereo" => (DepthSource::Stereo, Method::None),
         "monocular" => (DepthSource::Motion, Method::None),
-        _ => (DepthSource::Image, Method::Full),
+        _ => (DepthSource::Image, method),
     };
     // The images are small.
     (config.tracking.init_min_features, config.tracking.init_min_landmarks) = (100, 50);
     config
 }
 
+/// The largest memory of this process so far, MB; 0 where the system does not tell.
+fn peak_memory_mb() -> usize {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse().ok());
+    peak.unwrap_or(0) / 1024
+}
+
 #[test]
-fn no_value_within_its_range_makes_a_run_panic_or_hang() {
+fn no_value_within_its_range_makes_a_run_panic_or_hang_or_take_much_memory() {
     let frames = frames();
     for section in ["depth", "stereo", "monocular"] {
-        let poses = run(base(section), &frames, false);
+        let poses = run(base(section, Method::Full), &frames, false);
         // Motion along a wall alone is ambiguous for a single camera.
         assert!(poses >= 3 || section == "monocular", "only {poses} poses with {section}");
     }
-    let mut ends: Vec<(String, Number)> = Vec::new();
+    let mut ends: Vec<(String, Number, Method)> = Vec::new();
     Config::default().visit_keys("", &mut |path, key, _| {
         if let Check::Range(range) = key.check {
-            ends.extend(range().map(|end| (path.to_owned(), end)));
+            let alone = path.starts_with("stereo.") || path.starts_with("monocular.");
+            let methods = if alone { &[Method::None][..] } else { &[Method::None, Method::YfSlam, Method::Full] };
+            let each = range().into_iter().flat_map(|end| methods.iter().map(move |method| (end, *method)));
+            ends.extend(each.map(|(end, method)| (path.to_owned(), end, method)));
         }
     });
-    for (path, end) in ends {
+    assert!(ends.len() > 900, "{}", ends.len());
+    let run_end = |(path, end, method): &(String, Number, Method)| {
         let section = path.split('.').next().unwrap_or_default();
-        let mut config = base(section);
-        config.set(&path, end);
-        let start = Instant::now();
+        let mut config = base(section, *method);
+        config.set(path, *end);
         run(config, &frames, section == "dense");
-        assert!(start.elapsed() < Duration::from_secs(60), "{path} = {end} takes {:?}", start.elapsed());
-    }
+        let peak_mb = peak_memory_mb();
+        assert!(peak_mb < 2000, "{path} = {end} with {method:?}: {peak_mb} MB");
+    };
+    let workers = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        let work = |first: usize| ends.iter().skip(first).step_by(workers).for_each(run_end);
+        (0..workers).for_each(|first| drop(scope.spawn(move || work(first))));
+    });
 }

@@ -4,7 +4,7 @@
 //! ORB-SLAM2 (IEEE T-RO 2017, section III-B) uses (u, v, u_R). Here the disparity `bf / z` replaces u_R, because the noise of the position
 //! and the noise of the depth sensor are then independent and have separate weights.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::geometry::{CHI2_PIXEL, CHI2_PIXEL_DEPTH, Pinhole};
 
@@ -41,6 +41,12 @@ impl Measurement {
     #[inline]
     pub(crate) fn chi2(&self, r: &Vector3<f64>) -> f64 {
         (r.x * r.x + r.y * r.y) * self.weight_px + r.z * r.z * self.weight_disparity
+    }
+
+    /// Returns whether the position alone, without the depth, fits the point `p` of the camera frame.
+    pub(crate) fn fits_position(&self, camera: &Pinhole, p: &Point3<f64>) -> bool {
+        let r = self.residual(camera, &p.coords);
+        p.z > 1e-3 && (r.x * r.x + r.y * r.y) * self.weight_px <= CHI2_PIXEL
     }
 
     /// Returns the diagonal of the information matrix.

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{DetectionDemand, FrameDetections, Readout, ReadoutSearch, SavedMap, SetupError, Slam, Statistics};
+use super::{
+    DetectionDemand, FrameDetections, HealthCheck, Readout, ReadoutSearch, SavedMap, SetupError, Slam, Statistics,
+};
 use crate::backend::{Backend, MapOwner};
 use crate::camera::Camera;
 use crate::config::{Config, DenseConfig, DepthSource, ReadoutEstimation};
@@ -167,6 +169,7 @@ impl SlamBuilder {
             gravity: GravityDirection::default(),
             state: if map_use.is_some() { TrackingState::Lost } else { TrackingState::NotInitialized },
             anchors: Vec::new(),
+            health: HealthCheck::default(),
             statistics: Statistics::default(),
         })
     }

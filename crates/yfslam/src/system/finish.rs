@@ -2,7 +2,9 @@
 
 use nalgebra::Matrix6;
 
-use super::{Anchor, Pass, Slam, Tracked};
+use super::health::Evidence;
+use super::{Anchor, FrameHealth, Pass, Slam, Tracked};
+use crate::config::DepthSource;
 use crate::dense::{RowShift, Source};
 use crate::frame::Frame;
 use crate::tracking::{LostReason, TrackingStart, TrackingState};
@@ -32,6 +34,7 @@ impl Slam {
         if is_keyframe {
             self.extend_dense_map(frame, &mut pass);
         }
+        let health = self.check_health(frame, tracked, &pass);
         Tracked {
             timestamp_ns: frame.timestamp_ns,
             state: self.state,
@@ -42,8 +45,23 @@ impl Slam {
             start,
             lost_reason: localised.err(),
             loop_closure: pass.loop_closure,
+            health,
             times: pass.times,
         }
+    }
+
+    /// Looks for signs that the result may be wrong.
+    fn check_health(&mut self, frame: &Frame, tracked: bool, pass: &Pass) -> FrameHealth {
+        let current = &self.tracker.current;
+        let evidence = Evidence {
+            timestamp_ns: frame.timestamp_ns,
+            gray: &self.gray,
+            depth: Some(&*pass.depth).filter(|_| self.context.config.depth.source == DepthSource::Image),
+            t_cam_world: tracked.then_some(current.t_cam_world),
+            map_moved: pass.loop_closure.is_some() || self.state != TrackingState::Tracking,
+            contradicted: current.contradicted(),
+        };
+        self.health.check(&self.context.sensor, &evidence)
     }
 
     /// How tracking begins with a tracked frame, if it does.

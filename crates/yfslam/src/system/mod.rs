@@ -5,6 +5,7 @@ mod detection_demand;
 mod errors;
 mod finish;
 mod frame_detections;
+mod health;
 mod initialisation;
 mod keyframes;
 mod localise;
@@ -36,6 +37,8 @@ pub use builder::{MapUse, SlamBuilder};
 use detection_demand::DetectionDemand;
 pub use errors::{FrameRejected, SetupError};
 use frame_detections::FrameDetections;
+pub use health::FrameHealth;
+use health::HealthCheck;
 pub use results::Statistics;
 pub use saved_map::SavedMap;
 pub use shutter::Readout;
@@ -81,6 +84,7 @@ pub struct Slam {
     map_use: Option<MapUse>,
     /// Sequence number of the first keyframe of this session.
     first_keyframe: u64,
+    health: HealthCheck,
     statistics: Statistics,
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix6;
 
-use super::StageTimes;
+use super::{FrameHealth, StageTimes};
 use crate::geometry::Pose;
 use crate::loops::LoopClosure;
 use crate::tracking::{LostReason, TrackingStart, TrackingState};
@@ -31,6 +31,8 @@ pub struct Tracked {
     pub lost_reason: Option<LostReason>,
     /// The loop that a keyframe closed, this one or, with mapping on its own thread, an earlier one: all poses may have changed.
     pub loop_closure: Option<LoopClosure>,
+    /// Signs that the result may be wrong although no stage reports an error.
+    pub health: FrameHealth,
     /// Wall time of the stages.
     pub times: StageTimes,
 }

@@ -49,6 +49,8 @@ pub(crate) struct TrackedFrame {
     pub reference: Option<(KeyFrameId, Pose)>,
     /// Mean row time of the observations that gave the pose, s, and the velocity with which they were corrected.
     observed_at: (f64, Velocity),
+    /// Features whose depth contradicts their position, of all with depth, in the refinement that had most of them.
+    contradicted: [usize; 2],
     observations: Vec<PoseObservation>,
     /// Feature of each observation.
     observed: Vec<u32>,
@@ -64,6 +66,12 @@ impl TrackedFrame {
         self.timestamp_ns = timestamp_ns;
         self.observations.clear();
         self.observed_at = (0.0, Velocity::zeros());
+        self.contradicted = [0; 2];
+    }
+
+    /// Returns how many features have a depth that contradicts their position in the image, of how many with depth.
+    pub(crate) fn contradicted(&self) -> [usize; 2] {
+        self.contradicted
     }
 
     /// Returns the pose `t_cam_world` at the mean time at which its observations were read, and that time, s after the middle row. It hardly
@@ -190,8 +198,15 @@ impl TrackedFrame {
         }
         optimize_pose(&sensor.pinhole, config, &mut self.t_cam_world, &mut self.observations);
         let (mut landmarks, mut inliers, mut seconds) = (0, 0, 0.0);
+        let [mut contradicted, mut with_depth] = [0; 2];
         for (&i, o) in self.observed.iter().zip(&self.observations) {
             let matched = &mut self.matches[i as usize];
+            if o.measurement.weight_disparity > 0.0 {
+                let by_depth =
+                    !o.inlier && o.measurement.fits_position(&sensor.pinhole, &(self.t_cam_world * o.point_world));
+                contradicted += usize::from(by_depth);
+                with_depth += usize::from(by_depth || o.inlier);
+            }
             if o.inlier {
                 inliers += 1;
                 seconds += self.features.times().color.seconds(f64::from(self.features.features[i as usize].raw[1]));
@@ -204,6 +219,9 @@ impl TrackedFrame {
         }
         let velocity = self.features.velocity().copied().unwrap_or_default();
         self.observed_at = (seconds / f64::from(inliers.max(1)), velocity);
+        if with_depth > self.contradicted[1] {
+            self.contradicted = [contradicted, with_depth];
+        }
         landmarks
     }
 

@@ -1,4 +1,5 @@
-//! `--checkpoint`: the results so far are saved at intervals, so that a killed run loses no more than one interval.
+//! `--checkpoint`: the results so far are saved at intervals, so that a killed run loses no more than one interval, and `--resume`
+//! goes on from them.
 
 use std::time::{Duration, Instant};
 
@@ -15,6 +16,13 @@ pub struct Checkpoints {
 impl Checkpoints {
     pub fn new(every: Option<Duration>) -> Self {
         Self { every, last: Instant::now() }
+    }
+
+    /// Makes a checkpoint with `save`, if there are to be checkpoints.
+    pub fn save(&self, save: impl FnOnce()) {
+        if self.every.is_some() {
+            save();
+        }
     }
 
     /// Makes a checkpoint with `save`, if one is due. The next interval begins after it, so that saving never takes all of the time.

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use yfslam::{Config, Frame, Method};
+use yfslam_io::Fault;
 use yfslam_view::View;
 
 use super::checkpoint::Checkpoints;
@@ -14,6 +15,7 @@ use crate::output::folder::OutputFolder;
 use crate::output::recorder::{Recorder, ReportImages, RunOutputs};
 use crate::run::map_args::MapArgs;
 use crate::run::method_run::{EvalContext, MethodRun, RunResult};
+use crate::run::resume::RunIdentity;
 use crate::run::shared_detector::SharedDetector;
 use crate::stats::process::{ProcessMeter, ProcessTime};
 use crate::stats::skip::Skip;
@@ -26,6 +28,8 @@ use crate::ui::terminal::{Terminal, explain};
 /// A method run whose frames are recorded.
 pub struct RecordedRun {
     run: MethodRun,
+    /// What a checkpoint says about the run.
+    identity: RunIdentity,
     recorder: Recorder,
     failures: Failures,
 }
@@ -44,6 +48,10 @@ pub struct Setup<'a> {
     pub map: &'a MapArgs,
     pub outputs: RunOutputs,
     pub makes_dense_map: bool,
+    /// Faults put into the frames on purpose.
+    pub faults: &'a [Fault],
+    /// Whether to go on from the checkpoint in the output folder.
+    pub resumes: bool,
     pub terminal: Terminal,
 }
 
@@ -87,13 +95,26 @@ impl Setup<'_> {
             let outputs = self.outputs.of_method(if is_only { None } else { Some(describe(*method).0) });
             let camera = &self.source.camera.camera;
             let recorder = Recorder::prepare(folder, &config, camera, self.source.stamps_ns.len(), &outputs)?;
-            let run = MethodRun::prepare(config, self.source, own.take(), self.makes_dense_map, self.map)?;
-            anyhow::Ok(RecordedRun { run, recorder, failures: Failures::new(self.terminal) })
+            let faults: Vec<String> = self.faults.iter().map(ToString::to_string).collect();
+            let loaded = self.map.load_map.as_deref();
+            let identity = RunIdentity::new(self.source, &faults, &config, self.makes_dense_map, loaded)?;
+            let resumed = self.resumes.then(|| recorder.folder().read_checkpoint(&identity)).transpose()?;
+            let mut map = self.map.clone();
+            if resumed.is_some() {
+                map.load_map = Some(recorder.folder().checkpoint_map());
+            }
+            let mut run = MethodRun::prepare(config, self.source, own.take(), self.makes_dense_map, &map)?;
+            if let Some(resumed) = resumed {
+                run.pipeline.resume(resumed);
+            }
+            anyhow::Ok(RecordedRun { run, identity, recorder, failures: Failures::new(self.terminal) })
         };
         let runs = methods.iter().map(run).collect::<Result<Vec<_>>>()?;
         let shared = shared.map(|detector| SharedDetector::new(detector, self.config)).transpose()?;
-        out.remove_results()?;
-        runs.iter().try_for_each(|RecordedRun { run, recorder, .. }| recorder.begin(&run.config))?;
+        if !self.resumes {
+            out.remove_results()?;
+        }
+        runs.iter().try_for_each(|RecordedRun { run, recorder, .. }| recorder.begin(&run.config, self.resumes))?;
         Ok((runs, shared))
     }
 }
@@ -115,7 +136,7 @@ impl RecordedRun {
     /// Saves the results so far. A file that cannot be written now is written at the next checkpoint or at the end.
     fn save_checkpoint(&mut self, map: &MapArgs, terminal: Terminal) {
         let started = Instant::now();
-        if let Err(error) = self.recorder.write_checkpoint(&mut self.run.pipeline, map) {
+        if let Err(error) = self.recorder.write_checkpoint(&mut self.run.pipeline, map, &self.identity) {
             terminal.warn(&format!("no checkpoint: {}", explain(&error)));
         }
         self.run.pipeline.stages.push("checkpoint", started.elapsed());
@@ -127,7 +148,7 @@ impl RecordedRun {
         map: &MapArgs,
         failures: &mut Failures,
     ) -> Result<RecordedResult<'a>> {
-        let Self { mut run, mut recorder, failures: mut earlier } = self;
+        let Self { mut run, mut recorder, failures: mut earlier, .. } = self;
         run.pipeline.finish_mapping();
         recorder.finish_films(run.pipeline.slam(), &mut earlier);
         failures.add(&earlier);
@@ -148,6 +169,13 @@ pub fn drive(
     let Watchers { map, interrupt, terminal, view } = *watchers;
     let mut progress = Progress::new(terminal, &source.name, source.stamps_ns.len());
     let mut reading = Stages::default();
+    // The frames before the checkpoint from which the run goes on.
+    let done = runs.first().map_or(0, |run| run.run.pipeline.frames().total());
+    for _ in (0..done).take_while(|_| interrupt.received().is_none()) {
+        if source.frames.next(&mut reading).is_none() {
+            break;
+        }
+    }
     let mut meter = ProcessMeter::start();
     let interrupted = loop {
         let interrupted = interrupt.received();
@@ -184,6 +212,8 @@ pub fn drive(
         runs.iter().enumerate().for_each(|(number, run)| view.show_end(number, run.run.pipeline.slam()));
     }
     if let Some(interrupted) = interrupted {
+        // A later run goes on from here.
+        checkpoints.save(|| runs.iter_mut().for_each(|run| run.save_checkpoint(map, terminal)));
         terminal
             .note(&format!("{interrupted}; results are being written, and a second signal ends the program at once"));
     }

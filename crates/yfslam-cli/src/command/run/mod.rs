@@ -50,6 +50,7 @@ Examples:
   yfslam run DIR --masks DIR/masks                                 uses your own segmentation
   yfslam run DIR --sensor mono                                     uses the colour images only
   yfslam run DIR --save-map lab.map --checkpoint 30                saves trajectory and map every 30 s
+  yfslam run DIR --save-map lab.map --checkpoint 30 --resume       goes on where that run was interrupted or killed
   yfslam run DIR --detect-every 3                                  runs the detector on every third frame
   yfslam run synth:walking_xyz --fault covered@2+1 --fault late@5+0.5
   yfslam run DIR --view                                            shows the run on a page while it goes on
@@ -60,7 +61,7 @@ Files in the output folder:
   live.txt        poses of all tracked frames as estimated at the time of each frame
   map.ply         landmarks with colour
   T_map_world.txt transformation from the world of these files to the frame of `yfslam map`, in which z points up
-  run.json        input, counts of frames, times, errors
+  run.json        input, counts of frames, times, errors, and `health`: signs that the result may be wrong
   config.toml     the configuration of this run; --config repeats the run with it
   dense.map       with --dense, the input of `yfslam map`
   overlay/        with --overlay, one image for each frame
@@ -87,11 +88,14 @@ A single camera (--sensor mono):
   of the scale.
 
 Kinds of faults (--fault):
-  dropped, repeated, blank, black, frozen, late, depth-dropout, nan-stamp, covered, false-boxes
+  dropped, repeated, blank, black, frozen, late, nan-stamp, clock-ahead, clock-behind, wrong-size, covered, over-exposed, blurred, flicker,
+  dirt, ir-pattern, depth-dropout, depth-noise, depth-scale, depth-saturated, depth-late, false-boxes, no-boxes
 
 Signals:
   After SIGINT (Ctrl-C) or SIGTERM, the run ends with all files for the frames so far, and run.json has \"interrupted\": true. A second
-  signal ends the program at once; then the files of the last --checkpoint stay.
+  signal ends the program at once; then the files of the last --checkpoint stay. --resume goes on from them, or from where a signal
+  ended a run with --checkpoint: the camera is relocalised in the map of the checkpoint, and the results are those of all frames. Overlay,
+  recording and film hold the later frames only.
 
 Exit status:
   0    at least one method produced a trajectory, and all files were written
@@ -139,9 +143,12 @@ pub struct RunArgs {
     report: bool,
     #[command(flatten)]
     watch: WatchArgs,
-    /// Save trajectory.txt, live.txt and, with --save-map, the map at this interval of wall time, so that a killed run loses no more.
+    /// Save trajectory.txt, live.txt and the map at this interval of wall time, so that a killed run loses no more.
     #[arg(long, value_name = "SECONDS", value_parser = checkpoint::parse_interval, help_heading = "Output")]
     checkpoint: Option<Duration>,
+    /// Go on from the last checkpoint of an interrupted or killed run with the same arguments and output folder.
+    #[arg(long, conflicts_with = "load_map", help_heading = "Output")]
+    resume: bool,
     /// Ground truth, in TUM format or in the format of the folder [default: the ground truth in the folder].
     #[arg(long, value_name = "FILE", help_heading = "Evaluation")]
     groundtruth: Option<PathBuf>,
@@ -193,8 +200,17 @@ pub fn run_at(args: &RunArgs, pace: Pace, terminal: Terminal) -> Result<()> {
     let snapshots = args.report.then_some(if methods.len() == 1 { SNAPSHOTS } else { SNAPSHOTS_OF_EACH });
     let WatchArgs { record, video, .. } = args.watch.clone();
     let outputs = RunOutputs { overlay: args.overlay, snapshots, record, video };
-    let setup =
-        Setup { source: &source, config: &config, map: &args.map, outputs, makes_dense_map: args.dense, terminal };
+    args.check_resume(pace)?;
+    let setup = Setup {
+        source: &source,
+        config: &config,
+        map: &args.map,
+        outputs,
+        makes_dense_map: args.dense,
+        faults: &args.source.faults,
+        resumes: args.resume,
+        terminal,
+    };
     let (mut runs, mut shared) = setup.prepare(&methods, &out, detector)?;
     let checkpoints = Checkpoints::new(args.checkpoint);
     if let Pace::Live { rate } = pace {
@@ -262,6 +278,11 @@ pub fn run_at(args: &RunArgs, pace: Pace, terminal: Terminal) -> Result<()> {
     if let Some(page) = page {
         text += &format!("report: {}\n", page.display());
     }
+    if interrupted.is_none() && failures.check().is_ok() {
+        for recorded in &results {
+            failures.keep(recorded.folder.remove_checkpoint());
+        }
+    }
     // Standard output may be closed, so all files are written before.
     let printed = terminal.result(&text);
     failures.check()?;
@@ -312,6 +333,19 @@ impl RunArgs {
         self.map.check()
     }
 
+    /// Checks that the frames before a checkpoint can be left out.
+    ///
+    /// # Errors
+    /// They cannot, because frames come as they are sent.
+    fn check_resume(&self, pace: Pace) -> Result<()> {
+        ensure!(
+            !self.resume || (matches!(pace, Pace::EveryFrame) && !self.source.is_pipe()),
+            "--resume is for recordings and worlds whose every frame is used; to go on with live frames, save the map with --save-map and load it \
+             with --load-map"
+        );
+        Ok(())
+    }
+
     /// Returns the requested methods, each once; else the method of the configuration.
     fn methods(&self, config: &Config) -> Result<Vec<Method>> {
         let mut methods: Vec<Method> = Vec::new();
@@ -327,7 +361,8 @@ impl RunArgs {
             !config.dynamic.detect_async || self.map.threaded,
             "--detect-async (dynamic.detect_async) is for live use, with results that differ from run to run; add --threaded"
         );
-        let options = self.map.single_method_options();
+        let mut options = self.map.single_method_options();
+        options.extend(self.resume.then_some("--resume"));
         ensure!(
             methods.len() == 1 || options.is_empty(),
             "{} cannot be used with several methods, because each method makes its own map; give one --method",
