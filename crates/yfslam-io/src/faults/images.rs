@@ -15,17 +15,21 @@ const DIRT_SHARE: usize = 20;
 /// Side of the fields of the infrared pattern, each of which has one dot, px.
 const DOT_FIELD_PX: usize = 10;
 
+/// Replaces the image, or both images of a stereo pair.
+fn change_images(frame: &mut Frame, changed: impl Fn(&RgbImage) -> RgbImage) {
+    frame.color = Arc::new(changed(&frame.color));
+    frame.right = frame.right.as_deref().map(|right| Arc::new(changed(right)));
+}
+
 /// Replaces each colour by `change` of its column, row and value, in both images of a stereo pair.
 fn change_color(frame: &mut Frame, change: impl Fn(usize, usize, [u8; 3]) -> [u8; 3]) {
-    let changed = |image: &RgbImage| {
+    change_images(frame, |image| {
         let mut image = image.clone();
         for y in 0..image.height() {
             image.row_mut(y).iter_mut().enumerate().for_each(|(x, rgb)| *rgb = change(x, y, *rgb));
         }
-        Arc::new(image)
-    };
-    frame.color = changed(&frame.color);
-    frame.right = frame.right.as_deref().map(changed);
+        image
+    });
 }
 
 /// Replaces each reading of the depth image by `change` of its column, row and value.
@@ -49,9 +53,7 @@ pub(super) fn over_expose(frame: &mut Frame) {
 
 /// Blurs the images along their rows.
 pub(super) fn blur(frame: &mut Frame) {
-    let color = frame.color.clone();
-    let right = frame.right.clone();
-    let blurred = |image: &RgbImage| {
+    change_images(frame, |image| {
         let mut out = image.clone();
         for y in 0..image.height() {
             let row = image.row(y);
@@ -61,10 +63,8 @@ pub(super) fn blur(frame: &mut Frame) {
                 *rgb = [0, 1, 2].map(|c| mean(c) as u8);
             }
         }
-        Arc::new(out)
-    };
-    frame.color = blurred(&color);
-    frame.right = right.as_deref().map(blurred);
+        out
+    });
 }
 
 /// Changes the brightness from frame to frame, between a third and five thirds.

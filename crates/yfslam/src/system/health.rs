@@ -192,7 +192,7 @@ impl HealthCheck {
                 let off = (f64::from(depth) / now.z - 1.0).abs();
                 if off > DEPTH_TOLERANCE { jumped += 1 } else { agree += 1 }
             }
-            if flow[0].hypot(flow[1]) < MIN_FLOW_PX {
+            if libm::hypot(flow[0], flow[1]) < MIN_FLOW_PX {
                 continue;
             }
             // What is at this pixel now was there before, if the motion is right.
