@@ -1,9 +1,9 @@
 //! Changes of the map. Each operation preserves the invariants of [`crate::map`] and ignores ids of removed items.
 
-use std::sync::Arc;
-
+use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Point3, Vector3};
 use slotmap::SecondaryMap;
+use std::sync::Arc;
 
 use crate::features::rolling_shutter::{FrameTimes, Velocity};
 use crate::features::{Descriptor, FrameFeatures};
@@ -129,21 +129,19 @@ impl Map {
     pub(crate) fn update_landmark(&mut self, landmark: LandmarkId, scale_factors: &[f32]) {
         self.update_view_range(landmark, scale_factors);
         let Some(l) = self.landmarks.get(landmark) else { return };
-        let descriptors: Vec<Descriptor> =
-            l.observations.iter().map(|&(k, f)| self.keyframes[k].features.descriptors[f as usize]).collect();
-        let best = descriptors
-            .iter()
-            .map(|d| {
-                let mut distances: Vec<u32> = descriptors.iter().map(|e| d.distance(e)).collect();
-                let middle = (distances.len() - 1) / 2;
-                *distances.select_nth_unstable(middle).1
-            })
-            .enumerate()
-            .min_by_key(|&(i, median)| (median, i))
-            .map(|(i, _)| descriptors[i]);
+        let best = if let [only] = l.observations[..] {
+            Some(self.descriptor(only))
+        } else {
+            let descriptors: Vec<Descriptor> = l.observations.iter().map(|seen| self.descriptor(*seen)).collect();
+            most_typical(&descriptors).map(|i| descriptors[i])
+        };
         if let Some(best) = best {
             self.landmarks[landmark].descriptor = best;
         }
+    }
+
+    fn descriptor(&self, (keyframe, feature): (KeyFrameId, u32)) -> Descriptor {
+        self.keyframes[keyframe].features.descriptors[feature as usize]
     }
 
     /// Updates normal and distance range of a landmark whose position, or the pose of an observing keyframe, has changed.
@@ -363,4 +361,30 @@ impl Map {
         }
         Ok(())
     }
+}
+
+/// Returns the index of the descriptor with the least median distance to all of them, the first of several; `None` if there are none.
+fn most_typical(descriptors: &[Descriptor]) -> Option<usize> {
+    dispatch!(Level::new(), simd => least_median(simd, descriptors))
+}
+
+#[inline(always)]
+fn least_median<S: Simd>(_: S, descriptors: &[Descriptor]) -> Option<usize> {
+    let mut counts = [0u16; 257];
+    let mut best = None;
+    for (i, d) in descriptors.iter().enumerate() {
+        // The median by counting: distances are at most 256.
+        counts.fill(0);
+        descriptors.iter().for_each(|e| counts[d.distance(e) as usize] += 1);
+        let middle = (descriptors.len() - 1) / 2;
+        let mut below = 0;
+        let median = counts.iter().position(|n| {
+            below += usize::from(*n);
+            below > middle
+        });
+        if best.is_none_or(|(least, _)| median < least) {
+            best = Some((median, i));
+        }
+    }
+    best.map(|(_, i)| i)
 }

@@ -3,6 +3,8 @@
 //!
 //! In: a keyframe, or landmarks and a target keyframe. Out: further observations and merged landmarks in the map.
 
+use fearless_simd::{Level, Simd, dispatch};
+
 use crate::config::Config;
 use crate::context::Context;
 use crate::geometry::{CHI2_PIXEL, CHI2_PIXEL_DEPTH};
@@ -49,6 +51,12 @@ fn neighbours(config: &Config, map: &Map, keyframe: KeyFrameId) -> Vec<KeyFrameI
 /// Projects landmarks into `target`: a matching feature without landmark gets an observation of it; a matching feature with another
 /// landmark leads to the merging of both.
 pub(crate) fn fuse_into(context: &Context, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
+    // The inner loop compares descriptors, for which baseline x86-64 has no population count instruction.
+    dispatch!(Level::new(), simd => fuse_all(simd, context, map, target, landmarks));
+}
+
+#[inline(always)]
+fn fuse_all<S: Simd>(_: S, context: &Context, map: &mut Map, target: KeyFrameId, landmarks: &[LandmarkId]) {
     let Context { sensor, config } = context;
     let Some(k) = map.keyframe(target) else { return };
     let t_cam_world = k.t_cam_world;

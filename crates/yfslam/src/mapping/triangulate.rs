@@ -2,6 +2,7 @@
 //!
 //! In: a new keyframe and its covisible keyframes. Out: new landmarks with observations in two keyframes.
 
+use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::context::Context;
@@ -60,13 +61,27 @@ fn unmatched_features(k: &KeyFrame) -> Vec<usize> {
 
 /// Matches features by descriptor near their epipolar line. Returns pairs of feature indices (in a, in b).
 fn match_along_epipolar_lines(context: &Context, a: &KeyFrame, b: &KeyFrame, t_b_a: &Pose) -> Vec<(usize, usize)> {
+    // Baseline x86-64 has no population count instruction for the distances of descriptors.
+    dispatch!(Level::new(), simd => match_features(simd, context, a, b, t_b_a))
+}
+
+#[inline(always)]
+fn match_features<S: Simd>(_: S, context: &Context, a: &KeyFrame, b: &KeyFrame, t_b_a: &Pose) -> Vec<(usize, usize)> {
     let Context { sensor, config } = context;
     let c = &sensor.pinhole;
     let k_inv = Matrix3::new(1.0 / c.fx, 0.0, -c.cx / c.fx, 0.0, 1.0 / c.fy, -c.cy / c.fy, 0.0, 0.0, 1.0);
     let rotation = *t_b_a.rotation.to_rotation_matrix().matrix();
     // x_bᵀ F x_a = 0
     let fundamental = k_inv.transpose() * skew(&t_b_a.translation.vector) * rotation * k_inv;
-    let candidates = unmatched_features(b);
+    // Position, and squared distance from the line up to which a feature matches, for a line with a normal of length 1.
+    let candidates: Vec<(usize, [f64; 3])> = unmatched_features(b)
+        .into_iter()
+        .map(|j| {
+            let g = &b.features.features[j];
+            let scale = f64::from(sensor.scale(g.octave));
+            (j, [f64::from(g.u), f64::from(g.v), CHI2_LINE * scale * scale])
+        })
+        .collect();
     let mut is_matched = vec![false; b.features.len()];
     let mut matches = Vec::new();
     for i in unmatched_features(a) {
@@ -74,11 +89,9 @@ fn match_along_epipolar_lines(context: &Context, a: &KeyFrame, b: &KeyFrame, t_b
         let line = fundamental * Vector3::new(f64::from(f.u), f64::from(f.v), 1.0);
         let norm2 = line.x * line.x + line.y * line.y;
         let mut best = BestTwo::new();
-        for &j in &candidates {
-            let g = &b.features.features[j];
-            let distance = line.x * f64::from(g.u) + line.y * f64::from(g.v) + line.z;
-            let scale = f64::from(sensor.scale(g.octave));
-            if is_matched[j] || distance * distance > CHI2_LINE * scale * scale * norm2 {
+        for &(j, [u, v, limit]) in &candidates {
+            let distance = line.x * u + line.y * v + line.z;
+            if distance * distance > limit * norm2 || is_matched[j] {
                 continue;
             }
             best.add(j, a.features.descriptors[i].distance(&b.features.descriptors[j]), 0);

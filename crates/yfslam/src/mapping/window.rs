@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use slotmap::SecondaryMap;
+
 use crate::config::BundleConfig;
 use crate::context::{Context, SensorModel};
 use crate::map::{KeyFrameId, LandmarkId, Map};
@@ -51,14 +53,15 @@ impl Window {
         free_poses: usize,
         landmarks: Vec<LandmarkId>,
     ) -> Self {
-        let index: BTreeMap<KeyFrameId, usize> = keyframes.iter().enumerate().map(|(i, id)| (*id, i)).collect();
+        let index: SecondaryMap<KeyFrameId, usize> = keyframes.iter().enumerate().map(|(i, id)| (*id, i)).collect();
         let mut points = Vec::with_capacity(landmarks.len());
         let mut observations = Vec::new();
         for (point, id) in landmarks.iter().enumerate() {
             let Some(landmark) = map.landmark(*id) else { continue };
             points.push(landmark.position);
+            let first = observations.len();
             for &(k, f) in &landmark.observations {
-                let (Some(&pose), Some(k)) = (index.get(&k), map.keyframe(k)) else { continue };
+                let (Some(&pose), Some(k)) = (index.get(k), map.keyframe(k)) else { continue };
                 let feature = &k.features.features[f as usize];
                 observations.push(Observation {
                     pose,
@@ -67,6 +70,7 @@ impl Window {
                     trust: f64::from(feature.trust * landmark.trust()),
                 });
             }
+            observations[first..].sort_unstable_by_key(|o| o.pose);
         }
         let poses = keyframes.iter().filter_map(|id| map.keyframe(*id)).map(|k| k.t_cam_world).collect();
         let problem = BundleProblem { camera: sensor.pinhole, poses, free_poses, points, observations };
@@ -95,13 +99,19 @@ impl Window {
         for (id, position) in self.landmarks.iter().zip(&self.problem.points) {
             map.set_position(*id, *position);
         }
+        let mut changed = Vec::new();
         for o in &self.problem.observations {
             if o.trust <= 0.0 {
                 map.remove_observation(self.landmarks[o.point], self.keyframes[o.pose]);
+                changed.push(self.landmarks[o.point]);
             }
         }
         for id in &self.landmarks {
-            map.update_landmark(*id, &sensor.scale_factors);
+            map.update_view_range(*id, &sensor.scale_factors);
+        }
+        changed.dedup();
+        for id in changed {
+            map.update_landmark(id, &sensor.scale_factors);
         }
     }
 }
