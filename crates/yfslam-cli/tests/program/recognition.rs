@@ -159,7 +159,11 @@ fn a_map_survives_a_hundred_killed_writers() {
     let bytes = fs::read(&path).unwrap();
     for round in 0..100u64 {
         let mut writer = Command::new(std::env::current_exe().unwrap());
-        let writer = writer.args(["--exact", "recognition::victim"]).env(VICTIM, &path).stdout(Stdio::null()).stderr(Stdio::null());
+        let writer = writer
+            .args(["--exact", "recognition::victim"])
+            .env(VICTIM, &path)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
         let mut writer = writer.spawn().unwrap();
         // From before the first write to about the tenth one, at a different moment each time.
         std::thread::sleep(Duration::from_micros(2_000 + 731 * (round * 17 % 100)));

@@ -384,8 +384,8 @@ impl NormalEquations {
                     z[1][k] = f[1] * e[0][k] + f[2] * e[1][k];
                     z[2][k] = f[3] * e[0][k] + f[4] * e[1][k] + f[5] * e[2][k];
                 }
-                for k in 0..6 {
-                    self.reduced_rhs[6 * o.pose + k] -= z[0][k] * rhs[0] + z[1][k] * rhs[1] + z[2][k] * rhs[2];
+                for (k, sum) in self.reduced_rhs[6 * o.pose..][..6].iter_mut().enumerate() {
+                    *sum -= z[0][k] * rhs[0] + z[1][k] * rhs[1] + z[2][k] * rhs[2];
                 }
                 self.eliminated.push((o.pose, z));
             }
