@@ -4,7 +4,7 @@
 //! In: a copy of a part of the map: poses, points and observations. Out: refined poses and points. The points are eliminated first. The
 //! reduced symmetric system has six unknowns for each free pose; it is solved by Cholesky factorisation, dense or, if large, sparse.
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, dispatch, f64x8, prelude::*};
 use nalgebra::{DVector, Matrix3, Matrix6, Point3, Vector3, Vector6};
 use nalgebra_sparse::factorization::CscCholesky;
 use nalgebra_sparse::{CooMatrix, CscMatrix};
@@ -354,7 +354,7 @@ impl NormalEquations {
     }
 
     #[inline(always)]
-    fn eliminate_points<S: Simd>(&mut self, _: S, problem: &BundleProblem, lambda: f64) {
+    fn eliminate_points<S: Simd>(&mut self, simd: S, problem: &BundleProblem, lambda: f64) {
         let n = problem.free_poses;
         self.reduced.fill([NO_COLUMN; 6]);
         for (k, (h, b)) in self.pose_blocks.iter().zip(&self.pose_rhs).enumerate() {
@@ -392,12 +392,12 @@ impl NormalEquations {
             for (i, (a, z_a)) in self.eliminated.iter().enumerate() {
                 for (c, z_c) in &self.eliminated[..=i] {
                     let ((a, z_a), (c, z_c)) = if a >= c { ((a, z_a), (c, z_c)) } else { ((c, z_c), (a, z_a)) };
+                    // As a loop over the elements it is not compiled to vectors.
+                    let [z0, z1, z2] = z_a.map(|column| f64x8::from_slice(simd, &column));
                     let block = &mut self.reduced[a * (a + 1) / 2 + c];
                     for (j, column) in block.iter_mut().enumerate() {
-                        let (s0, s1, s2) = (z_c[0][j], z_c[1][j], z_c[2][j]);
-                        for k in 0..8 {
-                            column[k] -= z_a[0][k] * s0 + z_a[1][k] * s1 + z_a[2][k] * s2;
-                        }
+                        let product = z0 * z_c[0][j] + z1 * z_c[1][j] + z2 * z_c[2][j];
+                        (f64x8::from_slice(simd, column) - product).store_slice(column);
                     }
                 }
             }
