@@ -10,19 +10,16 @@ use crate::config::BundleConfig;
 use crate::context::SensorModel;
 use crate::geometry::Pose;
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::optimize::large_bundle::{LargeBundle, View};
+use crate::mapping::Window;
 
-/// Most keyframes that are adjusted.
+/// Most keyframes that are adjusted. Source: chosen: about a second of one core.
 const MAX_KEYFRAMES: usize = 1200;
 
 /// A copy of the part of a submap that is adjusted.
 #[derive(Clone, Debug)]
 pub(crate) struct GlobalBundle {
-    bundle: LargeBundle,
-    /// Keyframe of each pose.
-    keyframes: Vec<KeyFrameId>,
-    /// Landmark of each point, in the order of their ids.
-    landmarks: Vec<LandmarkId>,
+    /// Its landmarks are in the order of their ids.
+    window: Window,
     /// Sequence number of the next keyframe when the copy was made.
     next_sequence: u64,
 }
@@ -34,68 +31,37 @@ impl GlobalBundle {
         let mut keyframes = around(map, keyframe);
         // The root defines the world frame and is never adjusted.
         keyframes.retain(|id| *id != root);
-        let landmarks = map.landmarks_of(&keyframes);
         let free_poses = keyframes.len();
-        let mut index: SecondaryMap<KeyFrameId, usize> = keyframes.iter().enumerate().map(|(i, id)| (*id, i)).collect();
-        let mut bundle = LargeBundle {
-            camera: sensor.pinhole,
-            poses: keyframes.iter().filter_map(|id| map.keyframe(*id)).map(|k| k.t_cam_world).collect(),
-            free_poses,
-            points: Vec::new(),
-            views: Vec::new(),
-            start: vec![0],
-        };
-        let mut copied = Vec::new();
-        for id in landmarks {
-            // A landmark with one observation says nothing about the poses; it moves with its keyframe.
-            let Some(landmark) = map.landmark(id).filter(|l| l.observations.len() > 1) else { continue };
-            for &(k, f) in &landmark.observations {
-                let Some(keyframe) = map.keyframe(k) else { continue };
-                let pose = *index.entry(k)?.or_insert_with(|| {
-                    keyframes.push(k);
-                    bundle.poses.push(keyframe.t_cam_world);
-                    keyframes.len() - 1
-                });
-                let feature = &keyframe.features.features[f as usize];
-                let trust = f64::from(feature.trust * landmark.trust());
-                bundle.views.push(View { pose, measurement: sensor.measurement(feature), trust });
+        let mut landmarks = map.landmarks_of(&keyframes);
+        // A landmark with one observation says nothing about the poses; it moves with its keyframe.
+        landmarks.retain(|id| map.landmark(*id).is_some_and(|l| l.observations.len() > 1));
+        // What observes these landmarks from outside holds them in place.
+        let mut is_copied: SecondaryMap<KeyFrameId, ()> = keyframes.iter().map(|id| (*id, ())).collect();
+        for (k, _) in landmarks.iter().filter_map(|id| map.landmark(*id)).flat_map(|l| &l.observations) {
+            if is_copied.insert(*k, ()).is_none() {
+                keyframes.push(*k);
             }
-            bundle.points.push(landmark.position);
-            bundle.start.push(bundle.views.len());
-            copied.push(id);
         }
-        Some(Self { bundle, keyframes, landmarks: copied, next_sequence: map.keyframes_ever() })
+        let window = Window::assemble(sensor, map, keyframes, free_poses, landmarks);
+        Some(Self { window, next_sequence: map.keyframes_ever() })
     }
 
-    /// Adjusts the copy for as long as `go_on` returns true.
-    pub(crate) fn adjust(&mut self, config: &BundleConfig, go_on: &dyn Fn() -> bool) {
-        self.bundle.adjust(config, go_on);
+    /// Adjusts the copy for as long as `should_continue` returns true.
+    pub(crate) fn adjust(&mut self, config: &BundleConfig, should_continue: &dyn Fn() -> bool) {
+        self.window.adjust(config, should_continue);
     }
 
     /// Merges the adjusted poses and points into the map. Items that the map no longer contains are skipped.
     pub(crate) fn merge(self, sensor: &SensorModel, map: &mut Map) {
-        let Self { bundle, keyframes, landmarks, next_sequence } = self;
-        let mut before: SecondaryMap<KeyFrameId, Pose> = SecondaryMap::new();
-        for (id, pose) in keyframes.iter().zip(&bundle.poses).take(bundle.free_poses) {
-            if let Some(k) = map.keyframe(*id) {
-                before.insert(*id, k.t_cam_world);
-                map.set_pose(*id, *pose);
-            }
-        }
+        let Self { window, next_sequence } = self;
+        let poses = window.adjusted_keyframes().iter().filter_map(|id| Some((*id, map.keyframe(*id)?.t_cam_world)));
+        let mut before: SecondaryMap<KeyFrameId, Pose> = poses.collect();
+        window.merge_poses(map);
         move_later_keyframes(map, &mut before, next_sequence);
-        for ((id, position), range) in landmarks.iter().zip(&bundle.points).zip(bundle.start.windows(2)) {
-            map.set_position(*id, *position);
-            let wrong = bundle.views[range[0]..range[1]].iter().filter(|view| view.trust <= 0.0);
-            let wrong: Vec<usize> = wrong.map(|view| view.pose).collect();
-            wrong.iter().for_each(|pose| map.remove_observation(*id, keyframes[*pose]));
-            if wrong.is_empty() {
-                map.update_view_range(*id, &sensor.scale_factors);
-            } else {
-                map.update_landmark(*id, &sensor.scale_factors);
-            }
-        }
+        window.merge_landmarks(sensor, map);
         let moved: Vec<KeyFrameId> = before.keys().collect();
-        for id in map.landmarks_of(&moved).into_iter().filter(|id| landmarks.binary_search(id).is_err()) {
+        let is_new = |id: &LandmarkId| window.landmarks().binary_search(id).is_err();
+        for id in map.landmarks_of(&moved).into_iter().filter(is_new) {
             let Some(landmark) = map.landmark(id) else { continue };
             if let Some(motion) = world_motion(map, &before, landmark.reference) {
                 let position = motion * landmark.position;

@@ -42,7 +42,7 @@ impl Mapper {
         if map.keyframe_count() > 2
             && let Some(mut window) = Window::copy(context, map, keyframe)
         {
-            window.adjust(&config.bundle);
+            window.adjust(&config.bundle, &|| true);
             window.merge(sensor, map);
         }
         cull::redundant_keyframes(context, map, keyframe);

@@ -10,7 +10,7 @@ use slotmap::SecondaryMap;
 use crate::config::BundleConfig;
 use crate::context::{Context, SensorModel};
 use crate::map::{KeyFrameId, LandmarkId, Map};
-use crate::optimize::schur::{BundleProblem, BundleSummary, Observation};
+use crate::optimize::bundle::{BundleProblem, Observation};
 
 /// A copy of a part of the map: keyframes to adjust, their landmarks, and fixed keyframes that observe these, too.
 #[derive(Clone, Debug)]
@@ -46,7 +46,8 @@ impl Window {
         Some(Self::assemble(sensor, map, keyframes, free_poses, landmarks))
     }
 
-    fn assemble(
+    /// Copies keyframes, of which the first `free_poses` are adjusted, and landmarks with their observations in these.
+    pub(crate) fn assemble(
         sensor: &SensorModel,
         map: &Map,
         keyframes: Vec<KeyFrameId>,
@@ -77,25 +78,36 @@ impl Window {
         Self { problem, keyframes, landmarks }
     }
 
-    /// Adjusts the copy: some steps with Huber loss, removal of outliers, then more steps without it.
-    pub(crate) fn adjust(&mut self, config: &BundleConfig) -> BundleSummary {
-        self.adjust_while(config, &|| true)
+    /// Adjusts the copy for as long as `should_continue` returns true; see [`BundleProblem::adjust`].
+    pub(crate) fn adjust(&mut self, config: &BundleConfig, should_continue: &dyn Fn() -> bool) {
+        self.problem.adjust(config, should_continue);
     }
 
-    /// Adjusts as [`Window::adjust`], but stops when `should_continue`, called before each step, returns false.
-    pub(crate) fn adjust_while(&mut self, config: &BundleConfig, should_continue: &dyn Fn() -> bool) -> BundleSummary {
-        let first = self.problem.solve_while(config, config.first_iterations, true, should_continue);
-        self.problem.drop_outliers();
-        let second = self.problem.solve_while(config, config.second_iterations, false, should_continue);
-        self.problem.drop_outliers();
-        BundleSummary { iterations: first.iterations + second.iterations, ..second }
+    /// Returns the keyframes that are adjusted.
+    pub(crate) fn adjusted_keyframes(&self) -> &[KeyFrameId] {
+        &self.keyframes[..self.problem.free_poses]
+    }
+
+    /// Returns the landmarks, in the order in which they were given.
+    pub(crate) fn landmarks(&self) -> &[LandmarkId] {
+        &self.landmarks
     }
 
     /// Writes poses and points back to the map and removes outlier observations. Items that the map no longer contains are skipped.
     pub(crate) fn merge(self, sensor: &SensorModel, map: &mut Map) {
-        for (id, pose) in self.keyframes.iter().zip(&self.problem.poses).take(self.problem.free_poses) {
+        self.merge_poses(map);
+        self.merge_landmarks(sensor, map);
+    }
+
+    /// Writes the poses back.
+    pub(crate) fn merge_poses(&self, map: &mut Map) {
+        for (id, pose) in self.adjusted_keyframes().iter().zip(&self.problem.poses) {
             map.set_pose(*id, *pose);
         }
+    }
+
+    /// Writes the points back, removes outlier observations, and updates the landmarks; to be called after all poses are written back.
+    pub(crate) fn merge_landmarks(&self, sensor: &SensorModel, map: &mut Map) {
         for (id, position) in self.landmarks.iter().zip(&self.problem.points) {
             map.set_position(*id, *position);
         }

@@ -12,7 +12,7 @@ use crate::context::Context;
 use crate::features::matching::RotationHistogram;
 use crate::geometry::{Pair, Pose, TwoView, reconstruct};
 use crate::image::RgbImage;
-use crate::optimize::schur::{BundleProblem, Observation};
+use crate::optimize::bundle::{BundleProblem, Observation};
 use crate::tracking::TrackedFrame;
 use crate::tracking::search::search_first_frame;
 
