@@ -65,7 +65,7 @@ pub use frame_pipe::{FramePipe, PipeHeader};
 pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};
 pub use text::{read_file, read_text};
-pub use trajectory::{StampedPose, TrajectoryFile, write_trajectory};
+pub use trajectory::{StampedPose, TrajectoryFile, read_trajectory, write_trajectory};
 pub use write::RecordingWriter;
 
 /// The example of the README.

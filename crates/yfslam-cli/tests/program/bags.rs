@@ -1,12 +1,10 @@
 //! `yfslam run` and `yfslam info` with bags: the same frames give the same trajectory as a folder, to the byte.
 
-#[path = "../../../yfslam-io/tests/common/bags.rs"]
-mod writer;
 use std::fs;
 use std::path::Path;
 
+use crate::bag_writer::{CDR, COLOR, DEPTH, FRAME, Form, INFO, Message, NONE, ROS1, camera_info, mcap_bag, ros1_bag};
 use crate::common::{ate_rmse, fails, record, report, succeeds};
-use writer::{CDR, COLOR, DEPTH, FRAME, Form, INFO, Message, NONE, ROS1, camera_info, mcap_bag, ros1_bag};
 use yfslam_io::message::types::Transform;
 use yfslam_io::{CameraSource, FrameStream, Sequence, SequenceOptions, detect_camera};
 

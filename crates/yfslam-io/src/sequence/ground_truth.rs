@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Isometry3;
 
 use super::{csv, euroc, icl_nuim, kitti, matrices};
+use crate::bag::is_bag;
 use crate::error::Result;
 use crate::text::read_text;
 use crate::trajectory::{StampedPose, TrajectoryFile};
@@ -85,7 +86,7 @@ impl GroundTruthReader {
         self.path.as_deref().filter(|path| path.exists())
     }
 
-    /// Reads `path` in the format of the benchmark or of TUM; in the format of TUM the poses are those of the camera.
+    /// Reads `path` in the format of the benchmark or of TUM, or a bag; in the format of TUM and in bags the poses are those of the camera.
     ///
     /// # Errors
     /// The file cannot be read, or a line is malformed.
@@ -99,6 +100,9 @@ impl GroundTruthReader {
             && path.is_dir()
         {
             return matrices::read_pose_files(frames, path);
+        }
+        if is_bag(path) {
+            return TrajectoryFile::read(path);
         }
         let text = read_text(path)?;
         match &self.format {

@@ -4,11 +4,14 @@
 //! TUM     timestamp tx ty tz qx qy qz qw        one pose in each line, with blanks or commas
 //! EuRoC   nanoseconds,px,py,pz,qw,qx,qy,qz,…    with commas
 //! KITTI   r11 r12 r13 tx r21 … tz               no time; also 4 × 4 matrices of 16 numbers
+//! bag     PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, or chains of TF
 //! ```
 
+mod bag;
 mod columns;
 mod parse;
 mod stamps;
+mod transforms;
 mod write;
 
 use std::path::Path;
@@ -19,6 +22,7 @@ use crate::error::{Error, Result};
 use crate::text::read_text;
 use crate::time::TimeMirror;
 use crate::timestamp_order::keep_ascending;
+pub use bag::read_trajectory;
 pub use write::{write_trajectory, write_trajectory_as};
 
 const FORMAT_CURE: &str = "write 'timestamp tx ty tz qx qy qz qw' with blanks between the values, or give a file in the format of KITTI or EuRoC";
@@ -54,16 +58,19 @@ pub struct TrajectoryFile {
     pub format: TrajectoryFormat,
     /// What the user should know about how the file was read.
     pub notes: Vec<String>,
+    /// Topic of a bag that the poses come from; `None` for a file of text.
+    pub source: Option<String>,
 }
 
 impl TrajectoryFile {
-    /// Reads a trajectory file in any of the formats, which is recognised by its content.
+    /// Reads a trajectory file in any of the formats, which is recognised by its content, or a bag with one topic of poses;
+    /// [`read_trajectory`] chooses one of several.
     ///
     /// # Errors
     /// The file is unreadable or empty, or a line has the wrong number of columns, a value that is not finite, or a rotation that is
     /// none.
     pub fn read(path: &Path) -> Result<Self> {
-        Self::parse(&read_text(path)?, path)
+        read_trajectory(path, None, "`yfslam convert BAG poses.txt --to tum --topic`")
     }
 
     /// Parses the text of a trajectory file; `path` names it in error messages.

@@ -9,7 +9,7 @@ use yfslam_eval::StampedPose;
 use super::choose::TopicChoice;
 use crate::error::{Error, Result};
 use crate::message::MessageType;
-use crate::message::types::Transform;
+use crate::message::types::{Transform, frame_name as name};
 use crate::message::wire::{Reader, Wire, WireError};
 
 /// Most frames between a camera and the base of its robot.
@@ -140,9 +140,4 @@ impl Poses {
         let note = format!("ground truth from {topic}: {} poses in '{parent}', {said}{damaged}", poses.len());
         Ok((poses, note))
     }
-}
-
-/// Returns the name of a frame without the slash that early versions of tf wrote.
-fn name(frame: &str) -> String {
-    frame.trim_start_matches('/').to_owned()
 }
