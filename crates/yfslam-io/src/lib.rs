@@ -50,6 +50,7 @@ mod text;
 pub mod time;
 mod timestamp_order;
 pub mod trajectory;
+pub mod video;
 pub mod write;
 
 pub use atomic_file::{AtomicFile, prepare_folder, write_atomically};

@@ -43,3 +43,4 @@ mod stereo;
 mod structure;
 mod suite;
 mod synth;
+mod video;

@@ -65,7 +65,11 @@ pub fn detect_camera(folder: &Path) -> Result<CameraSource> {
     match CAMERA_FILES.iter().map(|name| folder.join(name)).find(|path| path.is_file()) {
         Some(path) => load_file(&path),
         None => {
-            let problem = format!("contains no camera file ({})", CAMERA_FILES.join(", "));
+            let problem = if folder.is_file() {
+                "is one file, without a camera file beside its images".into()
+            } else {
+                format!("contains no camera file ({})", CAMERA_FILES.join(", "))
+            };
             Err(Error::content(folder, problem, format!("give --camera with a file or one of {}", PRESETS.join(", "))))
         }
     }

@@ -25,6 +25,7 @@ mod replica;
 mod scannet;
 mod seven_scenes;
 mod tum;
+mod video;
 mod vslam_lab;
 
 use std::path::{Path, PathBuf};
