@@ -46,6 +46,8 @@ enum FormatArg {
     Euroc,
     /// Twelve numbers of a matrix, without times.
     Kitti,
+    /// Nanoseconds, position, quaternion x y z w, with commas and a header.
+    VslamLab,
 }
 
 pub fn run(args: &ConvertArgs, terminal: Terminal) -> Result<()> {
@@ -57,6 +59,7 @@ pub fn run(args: &ConvertArgs, terminal: Terminal) -> Result<()> {
         FormatArg::Tum => TrajectoryFormat::Tum,
         FormatArg::Euroc => TrajectoryFormat::Euroc,
         FormatArg::Kitti => TrajectoryFormat::Kitti,
+        FormatArg::VslamLab => TrajectoryFormat::VslamLab,
     };
     write_trajectory_as(&args.output, &poses, format)?;
     print(&format!("{} poses written to {}\n", poses.len(), args.output.display()))

@@ -43,6 +43,9 @@ pub enum TrajectoryFormat {
     Euroc,
     /// The upper three rows of a matrix, without a time.
     Kitti,
+    /// Time in nanoseconds, position, quaternion x y z w, with commas and a header, as VSLAM-LAB has ground truths and results. It is
+    /// written; a file that is read is recognised as that of TUM with a header.
+    VslamLab,
 }
 
 /// A trajectory read from a file.
