@@ -188,7 +188,7 @@ impl CommonArgs {
             }
             [format, ..] => {
                 bail!(
-                    "the format {} is not supported; give tum, kitti, euroc or bag, or leave it out",
+                    "the format {} is not supported; give tum, kitti or euroc, bag with two topics, or leave it out",
                     format.display()
                 )
             }
