@@ -39,19 +39,25 @@ pub fn read_trajectory(path: &Path, topic: Option<&str>, flag: &str) -> Result<T
 }
 
 fn read(path: &Path, topic: Option<&str>, flag: &str) -> Result<TrajectoryFile> {
-    let bag = Bag::open(path)?;
+    read_topic(&Bag::open(path)?, topic, flag).map(|(file, _)| file)
+}
+
+/// Reads a trajectory from a topic of an open bag; also returns the name of the frame whose poses it has, which is empty if it is not
+/// named.
+pub(crate) fn read_topic(bag: &Bag, topic: Option<&str>, flag: &str) -> Result<(TrajectoryFile, String)> {
+    let path = bag.path();
     let (name, frames) = match topic.map(|topic| topic.split_once(':').ok_or(topic)) {
         Some(Ok((name, frames))) => (Some(name), Some(frames)),
         Some(Err(name)) => (Some(name), None),
         None => (None, None),
     };
-    let index = choose(&bag, name, flag)?;
-    let Some(topic) = bag.topics().get(index) else { return Err(no_poses(&bag)) };
+    let index = choose(bag, name, flag)?;
+    let Some(topic) = bag.topics().get(index) else { return Err(no_poses(bag)) };
     let found = match topic.kind {
-        Some(MessageType::Tf) => TransformTree::of(&bag, index)?.trajectory(&bag, index, frames, flag)?,
-        _ => poses(&bag, index, frames, flag)?,
+        Some(MessageType::Tf) => TransformTree::of(bag, index)?.trajectory(bag, index, frames, flag)?,
+        _ => poses(bag, index, frames, flag)?,
     };
-    let Found { poses, source, mut notes } = found;
+    let Found { poses, child, source, mut notes } = found;
     notes.splice(0..0, bag.notes().iter().cloned());
     let (all, is_finite) =
         (poses.len(), |pose: &StampedPose| pose.t_world_cam.to_matrix().iter().all(|v| v.is_finite()));
@@ -66,12 +72,14 @@ fn read(path: &Path, topic: Option<&str>, flag: &str) -> Result<TrajectoryFile> 
     let mut file = TrajectoryFile::from_poses(poses, path)?;
     file.notes.splice(0..0, notes);
     file.source = Some(source);
-    Ok(file)
+    Ok((file, child))
 }
 
 /// What was found in a bag.
 pub struct Found {
     pub poses: Vec<StampedPose>,
+    /// The frame whose poses they are; empty if it is not named.
+    pub child: String,
     pub source: String,
     pub notes: Vec<String>,
 }
@@ -190,10 +198,11 @@ fn poses(bag: &Bag, index: usize, frames: Option<&str>, flag: &str) -> Result<Fo
             format_stamp(first_ns)
         ));
     }
+    let child = read.first().map_or_else(String::new, |(pose, _)| frame_name(&pose.child));
     let poses = read.iter().map(|(pose, _)| StampedPose::new(pose.stamp_ns, pose.t_parent_child)).collect();
     let type_name = topic.map_or("", |topic| topic.type_name.as_str());
     let frames = frames.map_or(String::new(), |frames| format!(":{frames}"));
-    Ok(Found { poses, source: format!("{name}{frames} ({type_name})"), notes })
+    Ok(Found { poses, child, source: format!("{name}{frames} ({type_name})"), notes })
 }
 
 fn one_pose(kind: MessageType, wire: Wire, bytes: &[u8]) -> std::result::Result<Transform, WireError> {

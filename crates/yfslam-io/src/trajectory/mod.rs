@@ -22,6 +22,7 @@ use crate::error::{Error, Result};
 use crate::text::read_text;
 use crate::time::TimeMirror;
 use crate::timestamp_order::keep_ascending;
+pub(crate) use bag::read_topic;
 pub use bag::read_trajectory;
 pub use write::{write_trajectory, write_trajectory_as};
 

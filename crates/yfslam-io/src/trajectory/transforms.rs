@@ -106,7 +106,7 @@ impl TransformTree {
             source +=
                 &format!("; {} of {} times are outside of one of them", densest.len() - poses.len(), densest.len());
         }
-        Ok(Found { poses, source: source + ")", notes })
+        Ok(Found { poses, child, source: source + ")", notes })
     }
 
     /// Returns parent and child of the poses that are wanted.
