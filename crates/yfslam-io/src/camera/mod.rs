@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 pub use check::check_camera;
 pub use dialect::parse_toml;
 pub use presets::{PRESETS, preset};
-pub use source::{CameraSource, Missing};
+pub use source::{CameraSource, Missing, RightCamera};
 pub use write::{camera_toml, write_camera};
 
 /// Names of camera files in a sequence folder, in the order in which they are tried.

@@ -63,7 +63,8 @@ impl FrameStream {
         let entries: Arc<[FrameEntry]> = sequence.entries.as_slice().into();
         let size = ImageSize { width: camera.width, height: camera.height };
         let calibration = sequence.calibration.as_ref();
-        let rectification = calibration.and_then(|calibration| calibration.rectification.clone());
+        let own = || calibration.and_then(|calibration| calibration.rectification.clone());
+        let rectification = source.rectification.clone().or_else(own);
         let resampling = calibration.and_then(|calibration| calibration.depth_resampling.clone());
         let mut read_left = ColorReader { size, bytes: Vec::new(), rectification };
         let mut read_right = ColorReader { bytes: Vec::new(), ..read_left.clone() };
