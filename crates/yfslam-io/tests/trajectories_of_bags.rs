@@ -134,7 +134,7 @@ fn the_only_topic_of_poses_is_found_and_several_are_named() {
         let error = refusal(&path, Some("/nothing"));
         assert!(error.contains("no topic '/nothing'") && error.contains("/vicon"), "{error}");
         let error = refusal(&path, Some("/tf:map.wheel"));
-        assert!(error.contains("'map.wheel'") && error.contains("its frames are base, map"), "{error}");
+        assert!(error.contains("'map.wheel'") && error.contains("its frames are map, base"), "{error}");
     }
     let text = folder.path().join("poses.txt");
     fs::write(&text, "1 0 0 0 0 0 0 1\n").unwrap();

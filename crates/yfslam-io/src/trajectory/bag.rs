@@ -20,6 +20,9 @@ use crate::time::format_stamp;
 /// Most topics or frames that an error message lists.
 const MAX_LISTED: usize = 20;
 
+/// Most pairs of frames of a topic that are distinguished.
+const MAX_PAIRS: usize = 100;
+
 const TYPES: &str = "PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped or TF";
 
 /// Reads a trajectory from a topic of a bag, or from a file of text; only a bag has topics. `flag` is what the user chooses a topic
@@ -170,9 +173,12 @@ fn poses(bag: &Bag, index: usize, frames: Option<&str>, flag: &str) -> Result<Fo
         notes.push(format!("{unreadable} messages of {name} are damaged and left out"));
     }
     let pair = |pose: &Transform| (frame_name(&pose.parent), frame_name(&pose.child));
-    let mut pairs: Vec<(String, String)> = read.iter().map(|(pose, _)| pair(pose)).collect();
-    pairs.sort();
-    pairs.dedup();
+    let mut pairs: Vec<(String, String)> = Vec::new();
+    for pair in read.iter().map(|(pose, _)| pair(pose)) {
+        if pairs.len() < MAX_PAIRS && !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
     let wanted = match frames {
         Some(frames) => {
             let known: Vec<String> = pairs.iter().flat_map(|(a, b)| [a.clone(), b.clone()]).collect();
@@ -181,9 +187,12 @@ fn poses(bag: &Bag, index: usize, frames: Option<&str>, flag: &str) -> Result<Fo
         None => None,
     };
     // The parent of odometry may change its name; another child is another body.
-    let mut children: Vec<&str> = pairs.iter().map(|(_, child)| child.as_str()).collect();
-    children.sort_unstable();
-    children.dedup();
+    let mut children: Vec<&str> = Vec::new();
+    for (_, child) in &pairs {
+        if !children.contains(&child.as_str()) {
+            children.push(child);
+        }
+    }
     if let ([(parent, child), ..], None, 2..) = (&pairs[..], &wanted, children.len()) {
         let problem = format!("{name} has poses of {} frames: {}", children.len(), children.join(", "));
         let cure = format!("choose one with {flag} such as {flag} {name}:{parent}.{child}");

@@ -4,12 +4,13 @@
 //! them. A pose is made at each time of the transform that was sent most often; the others are interpolated at that time, as `tf2` does,
 //! and never extrapolated. Only the transforms of the chain are kept in memory.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use nalgebra::Isometry3;
 use yfslam_eval::StampedPose;
 
+use super::Sorted;
 use super::bag::{Found, is_static, split_frames};
 use crate::bag::{Bag, Need};
 use crate::error::{Error, Result};
@@ -46,8 +47,8 @@ struct Step {
     link: Link,
 }
 
-/// Times, ns, and poses of one transform; times ascend.
-type Samples = Vec<(i64, Isometry3<f64>)>;
+/// Poses of one transform; times ascend.
+type Samples = Vec<StampedPose>;
 
 impl TransformTree {
     /// Reads which frames the topic of TF with this index and the topics of static transforms connect.
@@ -98,8 +99,10 @@ impl TransformTree {
                 Some(t * if step.is_inverse { step_pose.inverse() } else { step_pose })
             })
         };
-        let poses: Vec<StampedPose> =
-            densest.iter().filter_map(|(stamp_ns, _)| Some(StampedPose::new(*stamp_ns, at(*stamp_ns)?))).collect();
+        let poses: Vec<StampedPose> = densest
+            .iter()
+            .filter_map(|pose| Some(StampedPose::new(pose.timestamp_ns, at(pose.timestamp_ns)?)))
+            .collect();
         let changing = samples.iter().flatten().count();
         let mut source = format!("{name}:{parent}.{child} ({} transforms, of which {changing} change", steps.len());
         if poses.len() < densest.len() {
@@ -112,9 +115,12 @@ impl TransformTree {
     /// Returns parent and child of the poses that are wanted.
     fn frames(&self, bag: &Bag, name: &str, frames: Option<&str>, flag: &str) -> Result<Pair> {
         if let Some(frames) = frames {
-            let mut known: Vec<String> = self.pairs.keys().flat_map(|(a, b)| [a.clone(), b.clone()]).collect();
-            known.sort();
-            known.dedup();
+            let mut known: Vec<String> = Vec::new();
+            for frame in self.pairs.keys().flat_map(|(parent, child)| [parent, child]) {
+                if !known.contains(frame) {
+                    known.push(frame.clone());
+                }
+            }
             return split_frames(bag.path(), frames, &known);
         }
         let mut sent = self.pairs.iter().filter(|(_, link)| matches!(link, Link::Sent(_))).map(|(pair, _)| pair);
@@ -141,9 +147,11 @@ impl TransformTree {
     /// Returns the fewest transforms that lead from `parent` to `child`.
     fn chain(&self, parent: &str, child: &str) -> Option<Vec<Step>> {
         // For each frame that was reached: the frame before it, and the transform between them.
-        let mut reached: BTreeMap<&str, (&str, &Pair, bool)> = BTreeMap::new();
-        let mut queue = VecDeque::from([parent]);
-        while let Some(frame) = queue.pop_front() {
+        let mut reached: Vec<(&str, &str, &Pair, bool)> = Vec::new();
+        let mut queue = vec![parent];
+        let mut next_in_queue = 0;
+        while let Some(&frame) = queue.get(next_in_queue) {
+            next_in_queue += 1;
             if frame == child {
                 break;
             }
@@ -153,16 +161,16 @@ impl TransformTree {
                     (_, true) => (pair.0.as_str(), true),
                     _ => continue,
                 };
-                if next != parent && !reached.contains_key(next) {
-                    reached.insert(next, (frame, pair, is_inverse));
-                    queue.push_back(next);
+                if next != parent && reached.iter().all(|(known, ..)| *known != next) {
+                    reached.push((next, frame, pair, is_inverse));
+                    queue.push(next);
                 }
             }
         }
         let mut steps = Vec::new();
         let mut frame = child;
         while frame != parent {
-            let (before, pair, is_inverse) = *reached.get(frame)?;
+            let (_, before, pair, is_inverse) = *reached.iter().find(|(known, ..)| *known == frame)?;
             let link = *self.pairs.get(pair)?;
             steps.push(Step { pair: pair.clone(), is_inverse, link });
             frame = before;
@@ -180,12 +188,11 @@ fn samples(bag: &Bag, topic: usize, steps: &[Step]) -> Result<(Vec<Option<Sample
         let pair = (frame_name(&transform.parent), frame_name(&transform.child));
         let step = steps.iter().zip(&mut all).find(|(step, _)| !fixed && step.pair == pair);
         if let Some((_, Some(samples))) = step {
-            samples.push((transform.stamp_ns, transform.t_parent_child));
+            samples.push(StampedPose::new(transform.stamp_ns, transform.t_parent_child));
         }
     })?;
     for samples in all.iter_mut().flatten() {
-        samples.sort_by_key(|(stamp_ns, _)| *stamp_ns);
-        samples.dedup_by_key(|(stamp_ns, _)| *stamp_ns);
+        *samples = Sorted::of(samples).poses;
     }
     Ok((all, notes))
 }
@@ -217,13 +224,13 @@ fn transforms(wire: Option<Wire>, bytes: &[u8]) -> Option<Vec<Transform>> {
 }
 
 /// Returns the pose at a time, between the samples before and after it; `None` where there is none before or none after.
-fn interpolated(samples: &[(i64, Isometry3<f64>)], stamp_ns: i64) -> Option<Isometry3<f64>> {
-    let after = samples.partition_point(|(stamp, _)| *stamp < stamp_ns);
-    let (end_ns, end) = samples.get(after)?;
+fn interpolated(samples: &[StampedPose], stamp_ns: i64) -> Option<Isometry3<f64>> {
+    let after = samples.partition_point(|pose| pose.timestamp_ns < stamp_ns);
+    let StampedPose { timestamp_ns: end_ns, t_world_cam: end } = samples.get(after)?;
     if *end_ns == stamp_ns {
         return Some(*end);
     }
-    let (begin_ns, begin) = samples.get(after.checked_sub(1)?)?;
+    let StampedPose { timestamp_ns: begin_ns, t_world_cam: begin } = samples.get(after.checked_sub(1)?)?;
     let share = (stamp_ns - begin_ns) as f64 / (end_ns - begin_ns) as f64;
     // Poses that are turned by exactly 180° have no shortest way between them.
     Some(begin.try_lerp_slerp(end, share, 1e-12).unwrap_or(*begin))
@@ -238,11 +245,11 @@ mod tests {
     #[test]
     fn a_pose_between_two_samples_is_interpolated_and_one_outside_is_not_made() {
         let pose = |x: f64, angle: f64| Isometry3::new(Vector3::new(x, 0.0, 0.0), Vector3::new(0.0, 0.0, angle));
-        let samples = [(100, pose(1.0, 0.0)), (200, pose(3.0, 1.0))];
+        let samples = [StampedPose::new(100, pose(1.0, 0.0)), StampedPose::new(200, pose(3.0, 1.0))];
         let middle = interpolated(&samples, 125).unwrap();
         assert!((middle.translation.x - 1.5).abs() < 1e-12);
         assert!(middle.rotation.angle_to(&UnitQuaternion::from_euler_angles(0.0, 0.0, 0.25)) < 1e-12);
-        assert_eq!(interpolated(&samples, 200), Some(samples[1].1));
+        assert_eq!(interpolated(&samples, 200), Some(samples[1].t_world_cam));
         assert!(interpolated(&samples, 99).is_none() && interpolated(&samples, 201).is_none());
     }
 }
