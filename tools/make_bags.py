@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the frames of a folder in TUM layout into bags of every kind, with PyPI `rosbags`, and the same frames into a folder.
 
-    python3 tools/make_bags.py FOLDER OUT [--frames N]        makes a virtual environment in OUT/venv for itself
+    python3 tools/make_bags.py FOLDER OUT [--frames N] [--repeat N]      makes a virtual environment in OUT/venv for itself
 
 The folder OUT/folder has the colour images as PNG, decoded once, so that all bags but `jpeg` hold exactly its pixels.
 """
@@ -20,6 +20,7 @@ def arguments():
     parser.add_argument("folder", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--frames", type=int, default=40)
+    parser.add_argument("--repeat", type=int, default=1, help="how often the frames come, one after the other, in bags named NAME_xN")
     parser.add_argument("--only", help="names of bags, separated by commas")
     return parser.parse_args()
 
@@ -127,10 +128,26 @@ def messages(ros, frames, truth, c, kind):
             pixels = color if conversion is None else cv2.cvtColor(color, conversion)
             yield COLOR, "sensor_msgs/msg/Image", received, ros.image(stamp, kind, np.ascontiguousarray(pixels))
             yield DEPTH, "sensor_msgs/msg/Image", received + 1, ros.image(depth_stamp, "16UC1", depth)
-    last = frames[-1][0]
+    last = frames.last_stamp()
     for stamp, values in truth:
         if nanoseconds(stamp) <= last + 10**8:
             yield "/mocap/pose", "geometry_msgs/msg/PoseStamped", nanoseconds(stamp), ros.pose(nanoseconds(stamp), [float(v) for v in values])
+
+
+class Repeated:
+    """Frames that come several times, each time later; only one copy is in memory."""
+
+    def __init__(self, frames, times):
+        self.frames, self.times = frames, times
+        self.period = frames[-1][0] - frames[0][0] + 33_333_333
+
+    def __iter__(self):
+        for repetition in range(self.times):
+            for stamp, depth_stamp, *images in self.frames:
+                yield stamp + repetition * self.period, depth_stamp + repetition * self.period, *images
+
+    def last_stamp(self):
+        return self.frames[-1][0] + (self.times - 1) * self.period
 
 
 # Name: version of ROS, kind of images, compression.
@@ -191,10 +208,12 @@ def main():
     for name in ["camera.yaml", "groundtruth.txt"]:
         (folder / name).write_bytes((args.folder / name).read_bytes())
     for name, (version, kind, compression) in BAGS.items():
-        path = args.out / name
+        # The kind stays in the beginning of the name, and the ending at its end.
+        stem, dot, ending = name.partition(".")
+        path = args.out / (f"{stem}_x{args.repeat}{dot}{ending}" if args.repeat > 1 else name)
         if path.exists() or (args.only and name not in args.only.split(",")):
             continue
-        write(path, version, kind, compression, frames, truth, c)
+        write(path, version, kind, compression, Repeated(frames, args.repeat), truth, c)
         print(path)
 
 

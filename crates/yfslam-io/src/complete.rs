@@ -1,16 +1,22 @@
 //! Fills in what a camera file does not say from the recording to which it belongs.
 
+use yfslam::config::DepthSource;
+
 use crate::camera::CameraSource;
 use crate::error::{Error, Result};
 use crate::sequence::Sequence;
 use crate::stream::open_color;
 
-/// Fills in the size of the images where the camera file has none, from the first readable colour image of a sequence of files, and
+/// Prepares the rectification of a stereo pair that the camera file describes and that is not rectified; the camera is then the rectified left
+/// one, and [`FrameStream`](crate::FrameStream) rectifies the images. Fills in the size of the images where the camera file has none, from the first readable colour image of a sequence of files, and
 /// refuses what is missing still.
 ///
 /// # Errors
 /// As for [`CameraSource::complete`].
 pub fn complete_camera(camera: &mut CameraSource, sequence: &Sequence) -> Result<()> {
+    if sequence.depth_source == DepthSource::Stereo {
+        camera.rectify(|| first_image_size(sequence))?;
+    }
     camera.complete(sequence.depth_source, || first_image_size(sequence))
 }
 

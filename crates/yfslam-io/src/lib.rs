@@ -50,6 +50,7 @@ mod text;
 pub mod time;
 mod timestamp_order;
 pub mod trajectory;
+pub mod video;
 pub mod write;
 
 pub use atomic_file::{AtomicFile, prepare_folder, write_atomically};
@@ -65,7 +66,7 @@ pub use frame_pipe::{FramePipe, PipeHeader};
 pub use sequence::{Sequence, SequenceOptions};
 pub use stream::{FrameError, FrameFault, FrameStream};
 pub use text::{read_file, read_text};
-pub use trajectory::{StampedPose, TrajectoryFile, write_trajectory};
+pub use trajectory::{StampedPose, TrajectoryFile, read_trajectory, write_trajectory};
 pub use write::RecordingWriter;
 
 /// The example of the README.

@@ -20,7 +20,7 @@ pub struct MountedCamera {
 }
 
 /// Rectification of the images of two cameras.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct StereoRectification {
     /// The left camera after rectification; `bf` is the baseline times `fx`.
     pub camera: Camera,
@@ -30,7 +30,7 @@ pub struct StereoRectification {
 }
 
 /// Table that holds, for each pixel of a rectified image, its place in the original image.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Remap {
     width: usize,
     height: usize,
@@ -38,7 +38,7 @@ pub struct Remap {
 }
 
 /// Four neighbouring pixels, the first at `offset`, and the weights of the second column and row, in 1/256.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Tap {
     offset: u32,
     weights: [u16; 2],

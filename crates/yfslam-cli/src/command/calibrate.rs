@@ -74,6 +74,12 @@ pub fn run(args: &CalibrateArgs, terminal: Terminal) -> Result<()> {
         args.check_output(path)?;
     }
     let source = Source::open(&args.source, config.depth.source, None)?;
+    ensure!(
+        args.out.is_none() || source.camera.rectification.is_none(),
+        "the images of {} are rectified by {}, and the camera file would be that of the rectified images; leave out --out",
+        source.name,
+        source.camera.origin
+    );
     let mut camera = source.camera.camera.clone();
     if camera.readout_ms.is_some() {
         terminal.note(&format!("the readout time in {} is ignored for the fit", source.camera.origin));

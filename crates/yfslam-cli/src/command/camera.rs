@@ -39,12 +39,15 @@ pub fn run(args: &CameraArgs) -> Result<()> {
 
 /// Returns the file; what is not known is a comment.
 fn text(source: &CameraSource) -> Result<String> {
-    let CameraSource { camera, depth_factor, origin, kind, unused_keys, notes, missing } = source;
+    let CameraSource { camera, depth_factor, origin, kind, unused_keys, notes, missing, right, .. } = source;
     let mut about = format!("From {origin} ({kind}).\n");
     for note in notes {
         about += &format!("Note: {note}.\n");
     }
-    if let Some(problem) = &missing.stereo_problem {
+    if let Some(right) = right {
+        about +=
+            &format!("{} describes a second camera; the images of both are rectified when they are read.\n", right.key);
+    } else if let Some(problem) = &missing.stereo_problem {
         about += &format!("Not for stereo: {problem}.\n");
     }
     if !unused_keys.is_empty() {

@@ -12,7 +12,7 @@ use yfslam_eval::{
 };
 use yfslam_report::{Table, TableStyle, evaluation_table};
 
-use crate::input::trajectory::read_compared;
+use crate::input::trajectory::{Compared, read_compared};
 use crate::output::plots::{Plotted, figures, name_of, write_figures};
 use crate::run::evaluation::{EvaluationArgs, ScaleSource, evaluate_possible, scale_warning};
 use crate::ui::terminal::{Terminal, print};
@@ -25,11 +25,15 @@ Examples:
   yfslam eval groundtruth.txt mono.txt --align sim3
   yfslam eval poses/00.txt kitti.txt --times sequences/00/times.txt
   yfslam eval data.csv trajectory.txt --calibrate            lever arm and time offset to the body of the ground truth
+  yfslam eval lab.bag lab.bag --truth-topic /mocap/pose --topic /odom
+  yfslam eval lab.mcap trajectory.txt --truth-topic /tf:map.camera_link
 
 File formats, recognised by their content, in any combination:
   TUM     `t tx ty tz qx qy qz qw` in each line, with blanks or commas
   EuRoC   `nanoseconds,px,py,pz,qw,qx,qy,qz,…`, with commas
   KITTI   twelve numbers of a matrix in each line, without a time; also sixteen
+  bag     .bag, .mcap, .db3 or a folder of rosbag2, with PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped or TF;
+          /tf:map.base_link is the pose of base_link in map, composed of all transforms between them, also of /tf_static
 
 Other tools:
   The errors equal those of the tools of the TUM RGB-D benchmark and of evo. For --max-difference-ms, the former use 20, the latter 10;
@@ -39,7 +43,7 @@ Other tools:
 #[derive(Args, Debug)]
 #[command(after_help = HELP)]
 pub struct EvalArgs {
-    /// Ground truth in the format of TUM, EuRoC or KITTI.
+    /// Ground truth in the format of TUM, EuRoC or KITTI, or a bag.
     groundtruth: PathBuf,
     /// Estimated trajectory in one of these formats.
     estimate: PathBuf,
@@ -57,6 +61,15 @@ pub struct EvalArgs {
     /// Times of the poses of files in the format of KITTI, in seconds, one in each line.
     #[arg(long, value_name = "FILE")]
     times: Option<PathBuf>,
+    /// Topic of the ground truth in a bag: poses, odometry or transforms; of TF with two frames, as in /tf:map.base_link [default: the only one].
+    #[arg(long, value_name = "TOPIC", help_heading = "Bags")]
+    truth_topic: Option<String>,
+    /// Topic of the estimate in a bag.
+    #[arg(long, value_name = "TOPIC", help_heading = "Bags")]
+    topic: Option<String>,
+    /// Topic of the other estimate in a bag.
+    #[arg(long, value_name = "TOPIC", requires = "versus", help_heading = "Bags")]
+    versus_topic: Option<String>,
     /// Also fit lever arm, time offset and scale between the body of the ground truth and the camera; the error that remains is printed
     /// apart, because it has more free parameters than the usual one.
     #[arg(long, help_heading = "Evaluation")]
@@ -67,6 +80,16 @@ pub struct EvalArgs {
     /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
+}
+
+impl EvalArgs {
+    /// Returns the files in the order ground truth, estimate, other estimate.
+    fn compared(&self) -> Vec<Compared<'_>> {
+        let truth = Compared::of(&self.groundtruth, &self.truth_topic, "--truth-topic");
+        let estimate = Compared::of(&self.estimate, &self.topic, "--topic");
+        let other = self.versus.as_ref().map(|path| Compared::of(path, &self.versus_topic, "--versus-topic"));
+        [truth, estimate].into_iter().chain(other).collect()
+    }
 }
 
 /// An interval as the user writes it.
@@ -122,9 +145,7 @@ struct Improvement {
 }
 
 pub fn run(args: &EvalArgs, terminal: Terminal) -> Result<()> {
-    let paths: Vec<&Path> =
-        [&args.groundtruth, &args.estimate].into_iter().chain(&args.versus).map(PathBuf::as_path).collect();
-    let files = read_compared(&paths, args.times.as_deref(), terminal)?;
+    let files = read_compared(&args.compared(), args.times.as_deref(), terminal)?;
     let [truth, estimate, others @ ..] = &files[..] else {
         bail!("give the ground truth and the estimated trajectory")
     };

@@ -7,13 +7,14 @@ use clap::{Args, ValueEnum};
 use yfslam_eval::{AlignmentKind, Delta, Match, RpeOptions, Statistics, associate, ate, rpe};
 use yfslam_report::{TableStyle, errors_table, rpe_errors};
 
-use crate::input::trajectory::read_compared;
+use crate::input::trajectory::{Compared, read_compared};
 use crate::ui::terminal::{Terminal, print};
 
 const APE_HELP: &str = "\
 Examples:
   yfslam ape groundtruth.txt trajectory.txt -a
   yfslam ape tum groundtruth.txt mono.txt -as
+  yfslam ape bag lab.bag /mocap/pose /odom -a
 
 Difference from evo:
   The trajectories are always aligned, with or without -a. `yfslam eval` prints all errors at once.";
@@ -55,8 +56,8 @@ pub struct RpeArgs {
 #[derive(Args, Debug)]
 struct CommonArgs {
     /// Ground truth, then the estimated trajectory, in the format of TUM, EuRoC or KITTI; the word `tum`, `euroc` or `kitti` may come
-    /// before them.
-    #[arg(value_name = "FILE", num_args = 2..=3, required = true)]
+    /// before them. After the word `bag`, a bag and two of its topics.
+    #[arg(value_name = "FILE", num_args = 2..=4, required = true)]
     files: Vec<PathBuf>,
     /// Align the trajectories by rotation and translation.
     #[arg(short, long)]
@@ -154,26 +155,45 @@ impl CommonArgs {
             self.save_results.is_none(),
             "--save_results is not supported; `yfslam eval --json` prints all results"
         );
-        let (truth, estimate) = match &self.files[..] {
-            [truth, estimate] => (truth, estimate),
-            [format, truth, estimate] if ["tum", "kitti", "euroc"].iter().any(|known| format.as_os_str() == *known) => {
-                (truth, estimate)
-            }
-            [format, ..] => {
-                bail!("the format {} is not supported; give tum, kitti or euroc, or leave it out", format.display())
-            }
-            [] => bail!("give the ground truth and the estimated trajectory"),
-        };
+        let ([truth, estimate], [truth_topic, topic]) = self.files()?;
         ensure!(
             (0.0..=1e6).contains(&self.t_max_diff),
             "--t_max_diff is {}; give seconds, such as 0.01",
             self.t_max_diff
         );
         let max_diff_ns = (self.t_max_diff * 1e9) as u64;
-        let files = read_compared(&[truth, estimate], None, terminal)?;
+        let flag = "`yfslam ape bag BAG TRUTH-TOPIC TOPIC`";
+        let file = |path, topic| Compared { path, topic, flag };
+        let files = read_compared(&[file(truth, truth_topic), file(estimate, topic)], None, terminal)?;
         let [reference, poses] = &files[..] else { bail!("give the ground truth and the estimated trajectory") };
         let matches = associate(reference, poses, max_diff_ns).with_context(|| cannot_evaluate(estimate))?;
         Ok((matches, estimate))
+    }
+}
+
+/// Two files, and their topics.
+type Pair<'a> = ([&'a Path; 2], [Option<&'a str>; 2]);
+
+impl CommonArgs {
+    /// Returns the files of ground truth and estimate and, where both are topics of one bag, the topics.
+    fn files(&self) -> Result<Pair<'_>> {
+        let is_bag = |format: &Path| ["bag", "bag2", "mcap"].iter().any(|known| format.as_os_str() == *known);
+        let is_text = |format: &Path| ["tum", "kitti", "euroc"].iter().any(|known| format.as_os_str() == *known);
+        match &self.files[..] {
+            [truth, estimate] => Ok(([truth, estimate], [None, None])),
+            [format, bag, truth, estimate] if is_bag(format) => Ok(([bag, bag], [truth.to_str(), estimate.to_str()])),
+            [format, truth, estimate] if is_text(format) => Ok(([truth, estimate], [None, None])),
+            [format, ..] if is_bag(format) || is_text(format) => {
+                bail!("give two files after {}, or after bag a file and two topics", format.display())
+            }
+            [format, ..] => {
+                bail!(
+                    "the format {} is not supported; give tum, kitti or euroc, bag with two topics, or leave it out",
+                    format.display()
+                )
+            }
+            [] => bail!("give the ground truth and the estimated trajectory"),
+        }
     }
 }
 

@@ -70,8 +70,8 @@ pub fn from_above(points: &[CloudPoint], resolution_m: f32, cut_m: f32, [width, 
     canvas.image
 }
 
-/// Draws a bar whose length is a power of ten, up to a third of the width.
-fn scale_bar(image: &mut RgbImage, px_per_m: f32) {
+/// Draws a bar at the bottom left whose length is a power of ten, up to a third of the width.
+pub fn scale_bar(image: &mut RgbImage, px_per_m: f32) {
     const INK: [u8; 3] = [40, 40, 40];
     let longest_m = image.width() as f32 / px_per_m / 3.0;
     if !(1e-6..1e9).contains(&longest_m) {

@@ -68,7 +68,12 @@ const LETTERS: [(char, [u8; 7]); 48] = [
 
 /// Returns the side of a dot that suits an image, px.
 fn dot(image: &RgbImage) -> i64 {
-    (image.width() / PX_PER_DOT + 1) as i64
+    dot_of_width(image.width())
+}
+
+/// Returns the side of a dot on an image of this width, px.
+pub fn dot_of_width(width: usize) -> i64 {
+    (width / PX_PER_DOT + 1) as i64
 }
 
 /// Returns the height of a line of text on an image, px.
@@ -77,7 +82,7 @@ pub fn line_height(image: &RgbImage) -> i64 {
 }
 
 /// Returns the width of a text on an image, px.
-fn width(image: &RgbImage, text: &str) -> i64 {
+pub fn width(image: &RgbImage, text: &str) -> i64 {
     dot(image) * (ADVANCE * text.chars().count() as i64 - 1 + 2 * MARGIN)
 }
 

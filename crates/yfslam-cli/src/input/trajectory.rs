@@ -4,21 +4,44 @@ use std::path::Path;
 
 use anyhow::{Result, ensure};
 use yfslam_eval::StampedPose;
-use yfslam_io::TrajectoryFile;
 use yfslam_io::trajectory::{TrajectoryFormat, read_times};
+use yfslam_io::{TrajectoryFile, read_trajectory};
 
 use crate::ui::terminal::Terminal;
+
+/// A file of poses, or a topic of a bag.
+#[derive(Clone, Copy, Debug)]
+pub struct Compared<'a> {
+    /// The file or bag.
+    pub path: &'a Path,
+    /// Topic of the bag; `None` finds it by type.
+    pub topic: Option<&'a str>,
+    /// What the user chooses the topic with.
+    pub flag: &'a str,
+}
+
+impl<'a> Compared<'a> {
+    /// Makes the file of these arguments.
+    pub fn of(path: &'a Path, topic: &'a Option<String>, flag: &'a str) -> Self {
+        Self { path, topic: topic.as_deref(), flag }
+    }
+}
 
 /// Reads a ground truth and estimates that are compared with it, in any format. A file in the format of KITTI has no times: they come from
 /// `times`, or from the numbers of the lines if all files have as many.
 ///
 /// # Errors
 /// A file cannot be read, or only some of them have times.
-pub fn read_compared(paths: &[&Path], times: Option<&Path>, terminal: Terminal) -> Result<Vec<Vec<StampedPose>>> {
+pub fn read_compared(
+    compared: &[Compared<'_>],
+    times: Option<&Path>,
+    terminal: Terminal,
+) -> Result<Vec<Vec<StampedPose>>> {
     let times_ns = times.map(read_times).transpose()?;
+    let paths: Vec<&Path> = compared.iter().map(|file| file.path).collect();
     let mut files = Vec::new();
-    for path in paths {
-        let file = TrajectoryFile::read(path)?;
+    for Compared { path, topic, flag } in compared {
+        let file = read_trajectory(path, *topic, flag)?;
         files.push(match &times_ns {
             Some(times_ns) if file.format == TrajectoryFormat::Kitti => {
                 file.with_times(times_ns, times.unwrap_or(path))?
@@ -44,7 +67,10 @@ pub fn read_compared(paths: &[&Path], times: Option<&Path>, terminal: Terminal) 
 
 /// Returns the poses that were read from `path`; warns of those that were left out.
 pub fn checked_poses(file: TrajectoryFile, path: &Path, terminal: Terminal) -> Vec<StampedPose> {
-    let TrajectoryFile { poses, duplicates_skipped, backward_skipped, notes, .. } = file;
+    let TrajectoryFile { poses, duplicates_skipped, backward_skipped, notes, source, .. } = file;
+    if let Some(source) = source {
+        terminal.note(&format!("{}: {} poses of {source}", path.display(), poses.len()));
+    }
     for note in notes {
         terminal.warn(&format!("{}: {note}", path.display()));
     }

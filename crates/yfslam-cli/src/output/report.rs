@@ -4,7 +4,7 @@ use serde::Serialize;
 use yfslam::{Camera, Config};
 use yfslam_eval::Evaluation;
 use yfslam_io::Fault;
-use yfslam_io::sequence::AssociationReport;
+use yfslam_io::sequence::{AssociationReport, UsedTopics};
 
 use super::map_frame::Frames;
 use super::recorder::ReportImages;
@@ -58,6 +58,8 @@ pub struct RunReport<'a> {
     pub coordinates: Frames,
     /// Whether a signal ended the run before its last frame.
     pub interrupted: bool,
+    /// The topics in use; `null` unless the sequence is a bag. `camera_origin` names that of the calibration.
+    pub topics: Option<&'a UsedTopics>,
     /// The association of colour images with depth or right images; `null` for synthetic worlds.
     pub association: Option<Association>,
     /// Where the run has gone on from a checkpoint; `null` if it began at the first frame.
@@ -127,6 +129,7 @@ impl<'a> RunReport<'a> {
             frames: &outcome.frames,
             coordinates: Frames::from(&outcome.map_frame),
             interrupted: interrupted.is_some(),
+            topics: source.topics.as_ref(),
             association: source.association.as_ref().map(Association::from),
             resumed: outcome.resumed,
             health: &outcome.health,

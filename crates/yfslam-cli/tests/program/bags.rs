@@ -1,12 +1,10 @@
 //! `yfslam run` and `yfslam info` with bags: the same frames give the same trajectory as a folder, to the byte.
 
-#[path = "../../../yfslam-io/tests/common/bags.rs"]
-mod writer;
 use std::fs;
 use std::path::Path;
 
+use crate::bag_writer::{CDR, COLOR, DEPTH, FRAME, Form, INFO, Message, NONE, ROS1, camera_info, mcap_bag, ros1_bag};
 use crate::common::{ate_rmse, fails, record, report, succeeds};
-use writer::{CDR, COLOR, DEPTH, FRAME, Form, INFO, Message, NONE, ROS1, camera_info, mcap_bag, ros1_bag};
 use yfslam_io::message::types::Transform;
 use yfslam_io::{CameraSource, FrameStream, Sequence, SequenceOptions, detect_camera};
 
@@ -70,9 +68,19 @@ fn a_bag_gives_the_trajectory_of_a_folder_and_its_own_camera_and_ground_truth() 
         let report = report(&folder.path().join("out"));
         assert_eq!(report["frames"]["tracked"], 12);
         assert!(ate_rmse(&report) < 0.010, "{bag}: {}", ate_rmse(&report));
+        let topics = serde_json::json!({ "color": COLOR, "depth": DEPTH, "right": null, "ground_truth": "/tf" });
+        assert_eq!(report["topics"], topics, "{bag}");
+        // The same ground truth as chains of transforms, to the body and to the camera.
+        for chain in ["/tf:map.base_link".to_owned(), format!("/tf:map.{FRAME}")] {
+            run(bag, &["--depth-factor", &factor, "--truth-topic", &chain]);
+            let of_chain = crate::common::report(&folder.path().join("out"));
+            assert!((ate_rmse(&of_chain) - ate_rmse(&report)).abs() < 1e-9, "{bag}: {}", ate_rmse(&of_chain));
+            assert_eq!(of_chain["topics"]["ground_truth"], chain);
+        }
     }
     let backward = ["--camera", camera_file, "--reverse", "--start", "2", "--end", "9"];
     assert!(run("a.bag", &backward) == run("tum", &backward[2..]));
+    assert!(report(&folder.path().join("out"))["topics"].is_null(), "a folder has no topics");
     for sequence in ["tum", "synth:walking_xyz"] {
         fails(folder.path(), &["run", sequence, "--color-topic", "/x"], &["no topics", "--color-topic"]);
     }

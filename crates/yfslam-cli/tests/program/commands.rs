@@ -59,7 +59,8 @@ fn ape_and_rpe_take_the_options_of_evo_and_print_one_error() {
     let refused = |args: &[&str], words: &[&str]| fails(folder.path(), args, words);
     refused(&["ape", "truth.txt", "estimate.txt", "-r", "angle_deg"], &["trans_part", "yfslam rpe"]);
     refused(&["ape", "truth.txt", "estimate.txt", "-s"], &["--align"]);
-    refused(&["ape", "bag", "truth.txt", "estimate.txt"], &["bag", "tum, kitti or euroc"]);
+    refused(&["ape", "gpx", "truth.txt", "estimate.txt"], &["gpx", "tum, kitti or euroc"]);
+    refused(&["ape", "bag", "truth.txt", "estimate.txt"], &["a file and two topics"]);
     refused(&["ape", "truth.txt", "estimate.txt", "-ap"], &["--plot", "--report"]);
     refused(&["rpe", "truth.txt", "estimate.txt", "-d", "1.5"], &["1.5 frames", "whole number"]);
     refused(&["rpe", "truth.txt", "estimate.txt", "-u", "d"], &["'d'", "f, s, m"]);

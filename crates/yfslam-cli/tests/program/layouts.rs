@@ -210,8 +210,9 @@ fn a_folder_with_colour_alone_is_told_to_use_one_camera() {
     Shots::render(5000.0).write_tum(&seq);
     fs::remove_file(seq.join("depth.txt")).unwrap();
     fails(folder.path(), &["run", "seq"], &["colour images (rgb.txt)", "--sensor mono"]);
+    // It is no video, and with or without ffmpeg the error names it and the program.
     fs::write(folder.path().join("walk.mp4"), "video").unwrap();
-    fails(folder.path(), &["run", "walk.mp4"], &["walk.mp4", "ffmpeg", "--sensor mono"]);
+    fails(folder.path(), &["run", "walk.mp4"], &["walk.mp4", "ffmpeg"]);
 }
 
 /// Returns a grey PGM of 16 bits.
@@ -365,4 +366,35 @@ fn real_recordings_of_realsense_cameras_run_as_they_are() {
     Shots::render(5000.0).write_vslam_lab(&seq);
     edit_lines(&seq.join("rgb.csv"), |i, line| Some(if i == 3 { format!("soon{line}") } else { line.to_owned() }));
     fails(folder.path(), &["run", "seq"], &["rgb.csv:4", "soon"]);
+}
+
+#[test]
+fn the_result_for_vslam_lab_is_the_keyframes_and_none_is_left_of_an_earlier_run() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    Shots::render(5000.0).write_vslam_lab(&folder.join("seq"));
+    let run = ["run", "seq", "--method", "none", "--out", "out", "--vslam-lab"];
+    fs::create_dir(folder.join("exp")).unwrap();
+    fs::write(folder.join("exp/00002_KeyFrameTrajectory.csv"), "another run").unwrap();
+    succeeds(folder, &[&run[..], &["exp/00003"]].concat());
+    let result = folder.join("exp/00003_KeyFrameTrajectory.csv");
+    let text = fs::read_to_string(&result).unwrap();
+    let (header, rows) = text.split_once('\n').unwrap();
+    assert_eq!(header, "ts (ns),tx (m),ty (m),tz (m),qx,qy,qz,qw");
+    let first: Vec<&str> = rows.lines().next().unwrap().split(',').collect();
+    assert!(first.len() == 8 && first[0].parse::<i64>().is_ok(), "{first:?}");
+    assert_eq!(first[1..4], ["0.000000000"; 3], "the first keyframe is the world");
+    succeeds(folder, &["convert", "out/keyframes.txt", "converted.csv", "--to", "vslam-lab"]);
+    assert_eq!(fs::read_to_string(folder.join("converted.csv")).unwrap(), text);
+    for (id, words) in [("exp", ["no number of the run", "exp/00000"]), ("exp/", ["no number of the run", "exp/00000"])]
+    {
+        fails(folder, &[&run[..], &[id]].concat(), &words);
+    }
+    let several = ["run", "seq", "--method", "none,boxes", "--vslam-lab", "exp/1"];
+    fails(folder, &several, &["--vslam-lab", "one --method"]);
+    assert!(result.is_file());
+    // A run without a trajectory leaves no result of the run before.
+    fails(folder, &[&run[..], &["exp/00003", "--sensor", "mono"]].concat(), &["no trajectory"]);
+    assert!(!result.exists());
+    assert_eq!(fs::read_to_string(folder.join("exp/00002_KeyFrameTrajectory.csv")).unwrap(), "another run");
 }

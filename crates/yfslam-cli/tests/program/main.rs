@@ -7,6 +7,9 @@
 )]
 
 mod bad_input;
+mod bag_trajectories;
+#[path = "../../../yfslam-io/tests/common/bags.rs"]
+mod bag_writer;
 mod bags;
 mod bench;
 mod calibrate;
@@ -40,3 +43,4 @@ mod stereo;
 mod structure;
 mod suite;
 mod synth;
+mod video;

@@ -55,6 +55,11 @@ fn the_products_of_a_run_agree_with_each_other_and_are_the_same_on_every_run() {
     assert!(grid.starts_with(format!("P5\n{width} {height}\n255\n").as_bytes()), "{printed}");
     assert!(yaml.contains("image: grid.pgm\n") && yaml.contains("resolution: 0.05\n"), "{yaml}");
     assert!([0, 205, 254].iter().all(|shade| grid[15..].contains(shade)), "occupied, unknown and free");
+    let mut image = yfslam::RgbImage::default();
+    yfslam_io::decode::decode_color(&fs::read(map.join("grid.png")).unwrap(), None, &mut image).unwrap();
+    for (color, what) in [([0; 3], "occupied"), ([205; 3], "unknown"), ([254; 3], "free"), ([20, 90, 220], "path")] {
+        assert!(image.data().iter().filter(|pixel| **pixel == color).count() > 100, "{what} is drawn");
+    }
 
     let (again, _) = make("again");
     succeeds(folder.path(), &["map", "first.map", "--out", "saved"]);
@@ -65,7 +70,7 @@ fn the_products_of_a_run_agree_with_each_other_and_are_the_same_on_every_run() {
             assert_eq!(fs::read(entry.path()).unwrap(), fs::read(&other).unwrap(), "{other:?}");
             compared += 1;
         }
-        assert_eq!(compared, 11);
+        assert_eq!(compared, 12);
     }
     assert_eq!(fs::read(first.join("dense.map")).unwrap(), fs::read(again.join("dense.map")).unwrap());
     let mut saved = fs::read(folder.path().join("first.map")).unwrap();

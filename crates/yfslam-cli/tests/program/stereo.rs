@@ -154,6 +154,104 @@ fn a_euroc_folder_is_rectified_and_evaluated_with_the_ground_truth_of_its_body()
     fails(folder.path(), &["run", "MH"], &["cam1/sensor.yaml", "check the path"]);
 }
 
+/// Writes the cameras of EuRoC as files of Kalibr, ORB-SLAM3 and OpenCV; returns their names. `reversed` exchanges the direction of the pose.
+fn write_pairs(folder: &Path, reversed: bool) -> [&'static str; 3] {
+    let [(left, _), (right, t_left_right)] = euroc_cameras();
+    let numbers = |pose: &Isometry3<f64>| {
+        let rows = pose.to_homogeneous().transpose();
+        rows.as_slice().iter().map(|value| format!("{value:?}")).collect::<Vec<_>>()
+    };
+    let (forth, back) = (numbers(&t_left_right), numbers(&t_left_right.inverse()));
+    let (of_right, of_left) = if reversed { (back, forth) } else { (forth, back) };
+    let rows: Vec<String> = of_left.chunks(4).map(|row| format!("  - [{}]\n", row.join(", "))).collect();
+    let kalibr = |name: &str, c: &Camera, motion: &str| {
+        let [k1, k2, p1, p2, _] = c.distortion;
+        let Camera { fx, fy, cx, cy, .. } = c;
+        format!(
+            "{name}:\n{motion}  camera_model: pinhole\n  intrinsics: [{fx}, {fy}, {cx}, {cy}]\n  distortion_model: radtan\n\
+             \x20 distortion_coeffs: [{k1}, {k2}, {p1}, {p2}]\n  resolution: [376, 240]\n"
+        )
+    };
+    let motion = format!("  T_cn_cnm1:\n{}", rows.concat());
+    fs::write(folder.join("kalibr.yaml"), kalibr("cam0", &left, "") + &kalibr("cam1", &right, &motion)).unwrap();
+    let mut orb =
+        "%YAML:1.0\nCamera.type: \"PinHole\"\nCamera.width: 376\nCamera.height: 240\nCamera.fps: 20\n".to_owned();
+    let mut opencv = "%YAML:1.0\n---\nimage_width: 376\nimage_height: 240\nfps: 20\n".to_owned();
+    let matrix = |key: &str, [rows, cols]: [usize; 2], data: &str| {
+        format!("{key}: !!opencv-matrix\n  rows: {rows}\n  cols: {cols}\n  dt: d\n  data: [{data}]\n")
+    };
+    for (number, c) in [(1, &left), (2, &right)] {
+        let [k1, k2, p1, p2, _] = c.distortion;
+        for (name, value) in
+            [("fx", c.fx), ("fy", c.fy), ("cx", c.cx), ("cy", c.cy), ("k1", k1), ("k2", k2), ("p1", p1), ("p2", p2)]
+        {
+            writeln!(orb, "Camera{number}.{name}: {value:?}").unwrap();
+        }
+        opencv +=
+            &matrix(&format!("M{number}"), [3, 3], &format!("{}, 0, {}, 0, {}, {}, 0, 0, 1", c.fx, c.cx, c.fy, c.cy));
+        opencv += &matrix(&format!("D{number}"), [1, 5], &format!("{k1}, {k2}, {p1}, {p2}, 0"));
+    }
+    orb += &matrix("Stereo.T_c1_c2", [4, 4], &of_right.join(", "));
+    let (r, t): (Vec<_>, Vec<_>) = of_left[..12].iter().enumerate().partition(|(index, _)| index % 4 < 3);
+    let joined = |values: Vec<(usize, &String)>| {
+        values.into_iter().map(|(_, value)| value.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    opencv += &(matrix("R", [3, 3], &joined(r)) + &matrix("T", [3, 1], &joined(t)));
+    fs::write(folder.join("orb3.yaml"), orb).unwrap();
+    fs::write(folder.join("opencv.yaml"), opencv).unwrap();
+    ["kalibr.yaml", "orb3.yaml", "opencv.yaml"]
+}
+
+#[test]
+fn pairs_that_are_not_rectified_are_rectified_by_the_camera_files_of_kalibr_orb_slam3_and_opencv() {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path();
+    write_euroc(&folder.join("MH"));
+    let own = tracked(folder, "MH", &["--method", "none"]);
+    let positions = || -> Vec<Vector3<f64>> {
+        let read = yfslam_io::TrajectoryFile::read(&folder.join("out/trajectory.txt")).unwrap();
+        read.poses.iter().map(|pose| pose.t_world_cam.translation.vector).collect()
+    };
+    let expected = positions();
+    let check = |report: &Value| {
+        let [bf, own_bf] = [report, &own].map(|report| report["camera"]["bf"].as_f64().unwrap());
+        assert!((bf / own_bf - 1.0).abs() < 1e-9, "{bf} and {own_bf}");
+        let apart = positions().iter().zip(&expected).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        println!("{}: {apart} m from the trajectory with sensor.yaml", report["camera_origin"]);
+        // Kalibr's files have no rate, on which the spacing of keyframes depends.
+        assert!(apart < 1e-4 || report["camera"]["fps"] != 20.0, "{apart} m");
+    };
+    for file in write_pairs(folder, false) {
+        let report = tracked(folder, "MH", &["--method", "none", "--camera", file]);
+        assert!(ate_rmse(&report) < MAX_ATE_M, "{file}");
+        check(&report);
+        let origin = report["camera_origin"].as_str().unwrap();
+        assert!(origin.contains("rectified with"), "{origin}");
+        let printed = succeeds(folder, &["camera", file]).stdout;
+        assert!(printed.contains("rectified when they are read"), "{printed}");
+    }
+    // The same images as lists of pairs, with the camera file beside them.
+    fs::create_dir(folder.join("pairs")).unwrap();
+    fs::copy(folder.join("orb3.yaml"), folder.join("pairs/camera.yaml")).unwrap();
+    for (name, camera) in [("rgb.txt", "cam0"), ("right.txt", "cam1")] {
+        let list = fs::read_to_string(folder.join(format!("MH/mav0/{camera}/data.csv"))).unwrap();
+        let stamps = list.lines().skip(1).map(|line| line.split_once(',').unwrap().0);
+        let line = |stamp: &str| format!("{}.{} ../MH/mav0/{camera}/data/{stamp}.png\n", &stamp[..10], &stamp[10..]);
+        fs::write(folder.join("pairs").join(name), stamps.map(line).collect::<String>()).unwrap();
+    }
+    succeeds(folder, &["run", "pairs", "--method", "none", "--out", "out"]);
+    check(&report(&folder.join("out")));
+    let args = ["calibrate", "pairs", "--out", "readout.toml"];
+    fails(folder, &args, &["rectified with Camera2.fx", "leave out --out"]);
+    for file in write_pairs(folder, true) {
+        fails(
+            folder,
+            &["run", "MH", "--method", "none", "--camera", file],
+            &[file, "not to its right", "order of the cameras"],
+        );
+    }
+}
+
 #[test]
 fn a_kitti_folder_is_evaluated_with_the_poses_of_camera_0() {
     let folder = tempfile::tempdir().unwrap();

@@ -30,6 +30,11 @@ impl MessageRef {
         self.bag.read(self.position, bytes)
     }
 
+    /// Returns the name of the topic.
+    pub fn topic(&self) -> &str {
+        self.bag.topics().get(self.topic).map_or("", |topic| &topic.name)
+    }
+
     /// Returns the type of the message and how it is serialised.
     pub fn kind(&self) -> Option<(MessageType, Wire)> {
         let topic = self.bag.topics().get(self.topic)?;
@@ -47,7 +52,7 @@ impl Eq for MessageRef {}
 
 impl fmt::Display for MessageRef {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let topic = self.bag.topics().get(self.topic).map_or("", |topic| &topic.name);
-        write!(f, "{}: the message of {topic} at byte {}", self.bag.path().display(), self.position.begin())
+        let (path, topic) = (self.bag.path().display(), self.topic());
+        write!(f, "{path}: the message of {topic} at byte {}", self.position.begin())
     }
 }

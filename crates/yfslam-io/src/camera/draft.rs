@@ -3,7 +3,7 @@
 use yfslam::Camera;
 
 use super::settings::Settings;
-use super::source::{CameraSource, Missing};
+use super::source::{CameraSource, Missing, RightCamera};
 use crate::error::Result;
 
 /// A pinhole camera as a file describes it; `None` is not in the file.
@@ -19,8 +19,10 @@ pub struct Draft {
     pub bf: Option<f64>,
     /// Units of a depth image per metre.
     pub depth_factor: Option<f64>,
-    /// Why the file cannot serve a stereo camera although it describes two cameras.
+    /// Why the file cannot serve a stereo camera as it stands although it describes two cameras.
     pub stereo_problem: Option<String>,
+    /// The right camera of a pair that is not rectified.
+    pub right: Option<RightCamera>,
     pub notes: Vec<String>,
 }
 
@@ -88,6 +90,8 @@ impl Draft {
             kind,
             notes,
             missing,
+            right: self.right,
+            rectification: None,
         }
     }
 }

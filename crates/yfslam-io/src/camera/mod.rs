@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 pub use check::check_camera;
 pub use dialect::parse_toml;
 pub use presets::{PRESETS, preset};
-pub use source::{CameraSource, Missing};
+pub use source::{CameraSource, Missing, RightCamera};
 pub use write::{camera_toml, write_camera};
 
 /// Names of camera files in a sequence folder, in the order in which they are tried.
@@ -65,7 +65,11 @@ pub fn detect_camera(folder: &Path) -> Result<CameraSource> {
     match CAMERA_FILES.iter().map(|name| folder.join(name)).find(|path| path.is_file()) {
         Some(path) => load_file(&path),
         None => {
-            let problem = format!("contains no camera file ({})", CAMERA_FILES.join(", "));
+            let problem = if folder.is_file() {
+                "is one file, without a camera file beside its images".into()
+            } else {
+                format!("contains no camera file ({})", CAMERA_FILES.join(", "))
+            };
             Err(Error::content(folder, problem, format!("give --camera with a file or one of {}", PRESETS.join(", "))))
         }
     }

@@ -1,10 +1,14 @@
 //! A camera calibration with its origin, and what its file does not say.
 
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
 use yfslam::Camera;
 use yfslam::config::DepthSource;
 
 use super::check::check_camera;
 use crate::error::{Error, Result};
+use crate::rectify::{MountedCamera, StereoRectification};
 
 /// A checked camera calibration and its origin.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +27,21 @@ pub struct CameraSource {
     pub notes: Vec<String>,
     /// What the file does not say; [`complete_camera`](crate::complete_camera) fills it in.
     pub missing: Missing,
+    /// The right camera of a stereo pair whose images are not rectified; [`complete_camera`](crate::complete_camera) rectifies them.
+    pub right: Option<RightCamera>,
+    /// Rectification of the images when they are read; `camera` is then the rectified left camera.
+    pub rectification: Option<Arc<StereoRectification>>,
+}
+
+/// The right camera of a stereo pair.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RightCamera {
+    /// Calibration; the size is 0 where the file has none.
+    pub camera: Camera,
+    /// Pose of the right camera in the left one, m.
+    pub t_left_right: Isometry3<f64>,
+    /// The key that describes it.
+    pub key: &'static str,
 }
 
 /// What a camera file does not say.
@@ -51,6 +70,8 @@ impl CameraSource {
             kind: "calibration",
             notes,
             missing: Missing::default(),
+            right: None,
+            rectification: None,
         }
     }
 
@@ -93,6 +114,11 @@ impl CameraSource {
             }
             _ => {}
         }
+        self.complete_size(image_size)
+    }
+
+    /// Takes the size of the images where the file has none.
+    fn complete_size(&mut self, image_size: impl FnOnce() -> Result<[usize; 2]>) -> Result<()> {
         if self.missing.size {
             [self.camera.width, self.camera.height] = image_size()?;
             self.missing.size = false;
@@ -102,5 +128,30 @@ impl CameraSource {
             check_camera(self)?;
         }
         Ok(())
+    }
+
+    /// Prepares the rectification of a pair that is not rectified; the camera is then the rectified left one.
+    ///
+    /// # Errors
+    /// The first image cannot be read, or the two cameras do not form a stereo pair.
+    pub(crate) fn rectify(&mut self, image_size: impl FnOnce() -> Result<[usize; 2]>) -> Result<()> {
+        let Some(mut right) = self.right.take() else { return Ok(()) };
+        self.complete_size(image_size)?;
+        let left = &self.camera;
+        if right.camera.width == 0 {
+            (right.camera.width, right.camera.height) = (left.width, left.height);
+        }
+        let mounted = |camera: &Camera, t_body_cam| MountedCamera { camera: camera.clone(), t_body_cam };
+        let pair = [mounted(left, Isometry3::identity()), mounted(&right.camera, right.t_left_right)];
+        let [left, other] = &pair;
+        let rectification = StereoRectification::new(left, other).map_err(|problem| {
+            let problem = format!("camera {}: {problem}, by {}", self.origin, right.key);
+            Error::argument(problem, "check the order of the cameras and the pose of one in the other")
+        })?;
+        self.camera = rectification.camera.clone();
+        self.origin += &format!(", rectified with {}", right.key);
+        (self.missing.stereo_problem, self.missing.baseline) = (None, false);
+        self.rectification = Some(Arc::new(rectification));
+        check_camera(self)
     }
 }

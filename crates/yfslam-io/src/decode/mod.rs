@@ -19,7 +19,7 @@ use yfslam::{DepthImage, Image, RgbImage};
 use depth_values::DepthValues;
 
 /// Largest image that is decoded, px; it bounds the memory that a forged header can request.
-const MAX_PIXELS: usize = 1 << 25;
+pub(crate) const MAX_PIXELS: usize = 1 << 25;
 
 /// Width and height of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -242,3 +242,8 @@ impl Transform {
         to.f64s(self.t_parent_child.rotation.coords.as_slice());
     }
 }
+
+/// Returns the name of a frame without the slash that early versions of tf wrote.
+pub fn frame_name(frame: &str) -> String {
+    frame.trim_start_matches('/').to_owned()
+}

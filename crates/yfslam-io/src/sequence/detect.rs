@@ -24,6 +24,9 @@ pub fn layout(folder: &Path, options: &SequenceOptions) -> (Layout, String) {
     if crate::bag::is_bag(folder) {
         return (Layout::Bag, because("it begins like a bag or is named so"));
     }
+    if crate::video::is_video(folder) {
+        return (Layout::Video, because("it is a file that is named like a video"));
+    }
     if let Some(root) = euroc::root(folder) {
         return (Layout::Euroc, format!("it holds {}", root.join("cam0/data.csv").display()));
     }

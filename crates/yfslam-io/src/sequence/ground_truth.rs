@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Isometry3;
 
 use super::{csv, euroc, icl_nuim, kitti, matrices};
+use crate::bag::is_bag;
 use crate::error::Result;
 use crate::text::read_text;
 use crate::trajectory::{StampedPose, TrajectoryFile};
@@ -36,8 +37,8 @@ enum Format {
     IclNuim(f64),
     /// A table whose header names the columns.
     Csv,
-    /// Poses of the camera that were read from a bag.
-    Bag(Vec<StampedPose>),
+    /// Poses of the camera that were read from a topic of a bag.
+    Bag(Vec<StampedPose>, String),
 }
 
 impl GroundTruthReader {
@@ -70,9 +71,9 @@ impl GroundTruthReader {
         Self { path: Some(path), format: Format::Csv }
     }
 
-    /// Makes a reader of poses that were read from the bag at `path`.
-    pub(super) fn bag(path: PathBuf, poses: Vec<StampedPose>) -> Self {
-        Self { path: Some(path), format: Format::Bag(poses) }
+    /// Makes a reader of poses that were read from a topic of the bag at `path`.
+    pub(super) fn bag(path: PathBuf, poses: Vec<StampedPose>, topic: String) -> Self {
+        Self { path: Some(path), format: Format::Bag(poses, topic) }
     }
 
     /// Makes a reader of a sequence without ground truth.
@@ -85,12 +86,20 @@ impl GroundTruthReader {
         self.path.as_deref().filter(|path| path.exists())
     }
 
-    /// Reads `path` in the format of the benchmark or of TUM; in the format of TUM the poses are those of the camera.
+    /// Returns the topic of a bag from which the poses were read.
+    pub(super) fn topic(&self) -> Option<&str> {
+        match &self.format {
+            Format::Bag(_, topic) => Some(topic),
+            _ => None,
+        }
+    }
+
+    /// Reads `path` in the format of the benchmark or of TUM, or a bag; in the format of TUM and in bags the poses are those of the camera.
     ///
     /// # Errors
     /// The file cannot be read, or a line is malformed.
     pub fn read(&self, path: &Path) -> Result<TrajectoryFile> {
-        if let Format::Bag(poses) = &self.format
+        if let Format::Bag(poses, _) = &self.format
             && self.path.as_deref() == Some(path)
         {
             return TrajectoryFile::from_poses(poses.clone(), path);
@@ -99,6 +108,9 @@ impl GroundTruthReader {
             && path.is_dir()
         {
             return matrices::read_pose_files(frames, path);
+        }
+        if is_bag(path) {
+            return TrajectoryFile::read(path);
         }
         let text = read_text(path)?;
         match &self.format {

@@ -1,4 +1,4 @@
-//! Where an image of a recording is stored: in a file of its own, or in a message of a bag.
+//! Where an image of a recording is stored: in a file of its own, in a message of a bag, or in a video.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -7,6 +7,7 @@ use crate::bag::MessageRef;
 use crate::error::{Error, Result};
 use crate::sequence::lists::ListedFile;
 use crate::text::read_bytes;
+use crate::video::VideoFrame;
 
 /// Where an image is stored.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,6 +16,8 @@ pub enum ImageRef {
     File(PathBuf),
     /// A message of a bag.
     Message(MessageRef),
+    /// A frame of a video.
+    Video(VideoFrame),
 }
 
 /// An image and its time.
@@ -27,11 +30,11 @@ pub struct ListedImage {
 }
 
 impl ImageRef {
-    /// Returns the path of the image file; `None` for a message.
+    /// Returns the path of the image file; `None` for a message or a frame of a video.
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::File(path) => Some(path),
-            Self::Message(_) => None,
+            Self::Message(_) | Self::Video(_) => None,
         }
     }
 
@@ -47,14 +50,15 @@ impl ImageRef {
         self.file().is_some_and(|path| !path.is_file())
     }
 
-    /// Reads the file or the message into `bytes` and drops their old content.
+    /// Reads the file, the message, or the pixels of a frame of a video into `bytes` and drops their old content.
     ///
     /// # Errors
-    /// The file or the bag cannot be read, or the message is damaged.
+    /// The file or the bag cannot be read, or the message or frame is damaged.
     pub fn read(&self, bytes: &mut Vec<u8>) -> Result<()> {
         match self {
             Self::File(path) => read_bytes(path, bytes).map_err(|source| Error::read(path, source)),
             Self::Message(message) => message.read(bytes),
+            Self::Video(frame) => frame.read(bytes).map(|_| ()),
         }
     }
 }
@@ -64,6 +68,7 @@ impl fmt::Display for ImageRef {
         match self {
             Self::File(path) => path.display().fmt(f),
             Self::Message(message) => message.fmt(f),
+            Self::Video(frame) => frame.fmt(f),
         }
     }
 }

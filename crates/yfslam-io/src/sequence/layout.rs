@@ -9,7 +9,7 @@ use yfslam::config::DepthSource;
 
 use super::{
     AssociationReport, FrameEntry, GroundTruthReader, SequenceOptions, bag, detect, eth3d, euroc, folders, icl_nuim,
-    kitti, openloris, replica, scannet, seven_scenes, tum, vslam_lab,
+    kitti, openloris, replica, scannet, seven_scenes, tum, video, vslam_lab,
 };
 use crate::camera::CameraSource;
 use crate::depth_resampling::DepthResampling;
@@ -43,6 +43,8 @@ pub enum Layout {
     Folders,
     /// A bag of ROS 1, MCAP or rosbag2.
     Bag,
+    /// A video of one camera, which `ffmpeg` decodes.
+    Video,
 }
 
 /// The calibration that a layout brings along.
@@ -69,7 +71,7 @@ pub struct Listing {
 
 impl Layout {
     /// All layouts.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Tum,
         Self::Euroc,
         Self::Kitti,
@@ -82,6 +84,7 @@ impl Layout {
         Self::ScanNet,
         Self::Folders,
         Self::Bag,
+        Self::Video,
     ];
 
     /// Detects the layout of `folder`; the default is that of TUM.
@@ -104,6 +107,7 @@ impl Layout {
             Self::ScanNet => "scannet",
             Self::Folders => "folders",
             Self::Bag => "bag",
+            Self::Video => "video",
         }
     }
 
@@ -122,6 +126,7 @@ impl Layout {
             Self::ScanNet => "ScanNet",
             Self::Folders => "folders of images",
             Self::Bag => "bag",
+            Self::Video => "video",
         }
     }
 
@@ -140,13 +145,14 @@ impl Layout {
             Self::ScanNet => scannet::list(folder, options),
             Self::Folders => folders::list(folder, options),
             Self::Bag => bag::list(folder, options),
+            Self::Video => video::list(folder, options),
         }
     }
 
     /// Returns the calibration file that is part of the layout, if it exists.
     pub(super) fn calibration_file(self, folder: &Path) -> Option<PathBuf> {
         let names: &[&str] = match self {
-            Self::Tum | Self::IclNuim | Self::SevenScenes | Self::Bag => &[],
+            Self::Tum | Self::IclNuim | Self::SevenScenes | Self::Bag | Self::Video => &[],
             Self::Euroc => &["mav0/cam0/sensor.yaml", "cam0/sensor.yaml"],
             Self::Kitti => &["calib.txt"],
             Self::Eth3d => &[eth3d::CALIBRATION],

@@ -25,6 +25,7 @@ mod replica;
 mod scannet;
 mod seven_scenes;
 mod tum;
+mod video;
 mod vslam_lab;
 
 use std::path::{Path, PathBuf};
@@ -209,6 +210,38 @@ impl Sequence {
             ground_truth,
             because,
             notes,
+        })
+    }
+}
+
+/// The topics of a bag that are in use.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct UsedTopics {
+    /// Topic of the colour or left images.
+    pub color: String,
+    /// Topic of the depth images.
+    pub depth: Option<String>,
+    /// Topic of the right images.
+    pub right: Option<String>,
+    /// Topic of the ground truth; with two frames if it is a chain of transforms.
+    pub ground_truth: Option<String>,
+}
+
+impl Sequence {
+    /// Returns the topics that are in use; `None` unless it is a bag.
+    pub fn topics(&self) -> Option<UsedTopics> {
+        let topic = |image: &ImageRef| match image {
+            ImageRef::Message(message) => Some(message.topic().to_owned()),
+            ImageRef::File(_) | ImageRef::Video(_) => None,
+        };
+        let first = self.entries.first()?;
+        let paired = first.paired_image.as_ref().and_then(|paired| topic(&paired.image));
+        let is_stereo = self.depth_source == DepthSource::Stereo;
+        Some(UsedTopics {
+            color: topic(&first.color)?,
+            depth: paired.clone().filter(|_| !is_stereo),
+            right: paired.filter(|_| is_stereo),
+            ground_truth: self.ground_truth.topic().map(str::to_owned),
         })
     }
 }

@@ -131,8 +131,7 @@ fn no_lists(folder: &Path, wanted: &[&str]) -> Error {
         return Error::content(
             folder,
             "is a file, not a folder",
-            "unpack an archive and name the folder that holds the images; take a video apart with `ffmpeg -i VIDEO frames/%06d.png` and \
-             run that folder with --sensor mono and --fps",
+            "unpack an archive and name the folder that holds the images; a video whose name has an unusual ending is read with --layout video",
         );
     }
     let entries = match std::fs::read_dir(folder) {

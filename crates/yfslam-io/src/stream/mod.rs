@@ -63,7 +63,8 @@ impl FrameStream {
         let entries: Arc<[FrameEntry]> = sequence.entries.as_slice().into();
         let size = ImageSize { width: camera.width, height: camera.height };
         let calibration = sequence.calibration.as_ref();
-        let rectification = calibration.and_then(|calibration| calibration.rectification.clone());
+        let own = || calibration.and_then(|calibration| calibration.rectification.clone());
+        let rectification = source.rectification.clone().or_else(own);
         let resampling = calibration.and_then(|calibration| calibration.depth_resampling.clone());
         let mut read_left = ColorReader { size, bytes: Vec::new(), rectification };
         let mut read_right = ColorReader { bytes: Vec::new(), ..read_left.clone() };
@@ -211,12 +212,32 @@ pub fn open_color(
     bytes: &mut Vec<u8>,
     into: &mut RgbImage,
 ) -> std::result::Result<(), FrameFault> {
+    if let ImageRef::Video(frame) = image {
+        let size = frame.read(bytes).map_err(FrameFault::Unreadable)?;
+        return color_of_pixels(bytes, size, expected, into).map_err(|error| image_fault(image, error));
+    }
     image.read(bytes).map_err(FrameFault::Unreadable)?;
     let decoded = match kind(image) {
         Some((kind, wire)) => decode_color_message(kind, wire, bytes, expected, into),
         None => decode_color(bytes, expected, into),
     };
     decoded.map_err(|error| image_fault(image, error))
+}
+
+/// Copies the pixels of a frame of a video into an image.
+fn color_of_pixels(
+    pixels: &[u8],
+    size: ImageSize,
+    expected: Option<ImageSize>,
+    into: &mut RgbImage,
+) -> std::result::Result<(), DecodeError> {
+    if let Some(expected) = expected.filter(|expected| *expected != size) {
+        let cure = "use the calibration of this camera at the size of the video, or scale the video with ffmpeg";
+        return Err(DecodeError::WrongSize { found: size, expected, cure });
+    }
+    into.resize(size.width, size.height);
+    into.data_mut().as_flattened_mut().copy_from_slice(pixels);
+    Ok(())
 }
 
 /// Reads and decodes a depth image, as [`decode_depth_image`] does. `bytes` is a buffer that may be reused.
@@ -241,7 +262,7 @@ pub fn open_depth(
 /// Returns how the bytes of a message are read; `None` for those of a file.
 fn kind(image: &ImageRef) -> Option<(MessageType, Wire)> {
     match image {
-        ImageRef::File(_) => None,
+        ImageRef::File(_) | ImageRef::Video(_) => None,
         ImageRef::Message(message) => message.kind(),
     }
 }

@@ -4,11 +4,14 @@
 //! TUM     timestamp tx ty tz qx qy qz qw        one pose in each line, with blanks or commas
 //! EuRoC   nanoseconds,px,py,pz,qw,qx,qy,qz,…    with commas
 //! KITTI   r11 r12 r13 tx r21 … tz               no time; also 4 × 4 matrices of 16 numbers
+//! bag     PoseStamped, PoseWithCovarianceStamped, Odometry, TransformStamped, or chains of TF
 //! ```
 
+mod bag;
 mod columns;
 mod parse;
 mod stamps;
+mod transforms;
 mod write;
 
 use std::path::Path;
@@ -19,6 +22,8 @@ use crate::error::{Error, Result};
 use crate::text::read_text;
 use crate::time::TimeMirror;
 use crate::timestamp_order::keep_ascending;
+pub(crate) use bag::read_topic;
+pub use bag::read_trajectory;
 pub use write::{write_trajectory, write_trajectory_as};
 
 const FORMAT_CURE: &str = "write 'timestamp tx ty tz qx qy qz qw' with blanks between the values, or give a file in the format of KITTI or EuRoC";
@@ -39,6 +44,9 @@ pub enum TrajectoryFormat {
     Euroc,
     /// The upper three rows of a matrix, without a time.
     Kitti,
+    /// Time in nanoseconds, position, quaternion x y z w, with commas and a header, as VSLAM-LAB has ground truths and results. It is
+    /// written; a file that is read is recognised as that of TUM with a header.
+    VslamLab,
 }
 
 /// A trajectory read from a file.
@@ -54,16 +62,19 @@ pub struct TrajectoryFile {
     pub format: TrajectoryFormat,
     /// What the user should know about how the file was read.
     pub notes: Vec<String>,
+    /// Topic of a bag that the poses come from; `None` for a file of text.
+    pub source: Option<String>,
 }
 
 impl TrajectoryFile {
-    /// Reads a trajectory file in any of the formats, which is recognised by its content.
+    /// Reads a trajectory file in any of the formats, which is recognised by its content, or a bag with one topic of poses;
+    /// [`read_trajectory`] chooses one of several.
     ///
     /// # Errors
     /// The file is unreadable or empty, or a line has the wrong number of columns, a value that is not finite, or a rotation that is
     /// none.
     pub fn read(path: &Path) -> Result<Self> {
-        Self::parse(&read_text(path)?, path)
+        read_trajectory(path, None, "`yfslam convert BAG poses.txt --to tum --topic`")
     }
 
     /// Parses the text of a trajectory file; `path` names it in error messages.

@@ -130,11 +130,16 @@ fn every_format_that_is_written_is_read_back() {
         StampedPose::new(t * KITTI_PERIOD_NS, pose)
     };
     let poses: Vec<StampedPose> = (0..5).map(pose).collect();
-    for format in [TrajectoryFormat::Tum, TrajectoryFormat::Euroc, TrajectoryFormat::Kitti] {
+    for (format, read_as) in [
+        (TrajectoryFormat::Tum, TrajectoryFormat::Tum),
+        (TrajectoryFormat::Euroc, TrajectoryFormat::Euroc),
+        (TrajectoryFormat::Kitti, TrajectoryFormat::Kitti),
+        (TrajectoryFormat::VslamLab, TrajectoryFormat::Tum),
+    ] {
         let path = folder.path().join("poses.txt");
         write_trajectory_as(&path, &poses, format).unwrap();
         let file = TrajectoryFile::read(&path).unwrap();
-        assert_eq!(file.format, format);
+        assert_eq!(file.format, read_as);
         for (found, wanted) in file.poses.iter().zip(&poses) {
             assert_eq!(found.timestamp_ns, wanted.timestamp_ns, "{format:?}");
             let apart = found.t_world_cam.inverse() * wanted.t_world_cam;

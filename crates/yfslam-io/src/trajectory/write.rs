@@ -30,6 +30,7 @@ pub fn write_trajectory_as(path: &Path, poses: &[StampedPose], format: Trajector
                     "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []"
                 )?;
             }
+            TrajectoryFormat::VslamLab => writeln!(writer, "ts (ns),tx (m),ty (m),tz (m),qx,qy,qz,qw")?,
             TrajectoryFormat::Kitti => {}
         }
         for pose in poses {
@@ -55,6 +56,13 @@ fn line(writer: &mut (impl Write + ?Sized), pose: &StampedPose, format: Trajecto
                 writer,
                 "{timestamp_ns},{:.9},{:.9},{:.9},{:.9},{:.9},{:.9},{:.9}",
                 t.x, t.y, t.z, q.w, q.x, q.y, q.z
+            )
+        }
+        TrajectoryFormat::VslamLab => {
+            writeln!(
+                writer,
+                "{timestamp_ns},{:.9},{:.9},{:.9},{:.9},{:.9},{:.9},{:.9}",
+                t.x, t.y, t.z, q.x, q.y, q.z, q.w
             )
         }
         TrajectoryFormat::Kitti => {

@@ -19,6 +19,7 @@ use yfslam_io::{StampedPose, prepare_folder, write_atomically, write_trajectory}
 use super::options::HeightBand;
 use crate::draw::colors::{FREE, class_color};
 use crate::draw::dense_image::{SHOWN_M, from_above, from_corner};
+use crate::draw::grid_image::draw_grid;
 use crate::output::class_legend::ClassLegend;
 use crate::output::map_frame;
 use crate::ui::progress::Progress;
@@ -49,12 +50,17 @@ impl Exporter<'_> {
     /// Writes the transformation into the frame of the products, and the path of the camera in it.
     pub fn frame(&self) -> Result<String> {
         map_frame::write(&self.folder, &self.frame)?;
+        write_trajectory(&self.folder.join("path.txt"), &self.path())?;
+        Ok(String::new())
+    }
+
+    /// Returns the poses of the keyframes in the frame of the products, in the order of time.
+    fn path(&self) -> Vec<StampedPose> {
         let r_map_world = self.frame.r_map_world;
         let pose = |placed: &PlacedPatch| StampedPose::new(placed.timestamp_ns, r_map_world * placed.t_world_cam);
         let mut path: Vec<StampedPose> = self.map.patches.iter().map(pose).collect();
         path.sort_by_key(|pose| pose.timestamp_ns);
-        write_trajectory(&self.folder.join("path.txt"), &path)?;
-        Ok(String::new())
+        path
     }
 
     /// Writes the point cloud and images of it.
@@ -115,10 +121,13 @@ impl Exporter<'_> {
         Ok(text + "\n")
     }
 
-    /// Writes the occupancy grid of the heights `band` above the floor.
+    /// Writes the occupancy grid of the heights `band` above the floor, and an image of it with the path.
     pub fn grid(&self, HeightBand(band): HeightBand) -> Result<String> {
         let grid = ground_grid(&self.volume, band.map(|height| self.floor_m + height));
         write_nav2(&self.folder.join("grid.pgm"), &grid)?;
+        let position = |pose: &StampedPose| [pose.t_world_cam.translation.x, pose.t_world_cam.translation.y];
+        let path: Vec<[f64; 2]> = self.path().iter().map(position).collect();
+        write_color_png(&self.folder.join("grid.png"), &draw_grid(&grid, &path))?;
         let count = |what| grid.cells.iter().filter(|cell| **cell == what).count();
         let (occupied, free) = (count(GridCell::Occupied), count(GridCell::Free));
         Ok(format!("grid: {} × {} cells, {occupied} occupied, {free} free\n", grid.width, grid.height))

@@ -38,6 +38,7 @@ Files in the output folder:
   above.png, corner.png     with --cloud, images of the cloud
   octomap.bt, octomap.ot    with --octomap, for OctoMap: free or occupied, and log-odds
   grid.pgm, grid.yaml       with --grid, for the ROS navigation stack
+  grid.png                  with --grid, an image of it with the path, axes in metres, a scale bar and a legend
   mesh.ply                  with --mesh, coloured triangles
   path.txt                  poses of the keyframes in the frame of the products, as lines of TUM
   T_map_world.txt           transformation from the world of the run to this frame

@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod drive;
+mod vslam_lab;
 mod watch;
 
 use std::ffi::OsString;
@@ -13,6 +14,7 @@ use clap::{Args, Command, FromArgMatches};
 use yfslam::config::DepthSource;
 use yfslam::{Config, Method};
 use yfslam_eval::{EvalOptions, ExpectedFrames};
+use yfslam_io::trajectory::{TrajectoryFormat, write_trajectory_as};
 use yfslam_report::{TableStyle, evaluation_table};
 use yfslam_view::ViewOptions;
 
@@ -66,6 +68,7 @@ Files in the output folder:
   dense.map       with --dense, the input of `yfslam map`
   overlay/        with --overlay, one image for each frame
   report.html     with --report, one page with errors, figures, images and times
+  With --vslam-lab FOLDER/ID, FOLDER/ID_KeyFrameTrajectory.csv has the keyframes: nanoseconds, position, quaternion x y z w.
 
   Each file is written whole or not at all. When a run begins, files of these names are removed, except config.toml: those that an
   earlier run left are never taken for results of this one. Incomplete files of killed runs (.yfslam-*.tmp) are removed, too.
@@ -143,6 +146,9 @@ pub struct RunArgs {
     report: bool,
     #[command(flatten)]
     watch: WatchArgs,
+    /// Also write the keyframes to FOLDER/ID_KeyFrameTrajectory.csv, the result that VSLAM-LAB expects of a baseline.
+    #[arg(long, value_name = "FOLDER/ID", help_heading = "Output")]
+    vslam_lab: Option<PathBuf>,
     /// Save trajectory.txt, live.txt and the map at this interval of wall time, so that a killed run loses no more.
     #[arg(long, value_name = "SECONDS", value_parser = checkpoint::parse_interval, help_heading = "Output")]
     checkpoint: Option<Duration>,
@@ -197,6 +203,7 @@ pub fn run_at(args: &RunArgs, pace: Pace, terminal: Terminal) -> Result<()> {
     let truth = find_truth(args, &source, terminal)?;
     let out = OutputFolder::prepare(args.out.as_deref(), &source.name)?;
     args.check_map(&out)?;
+    let vslam_lab = args.vslam_lab.as_deref().map(vslam_lab::prepare).transpose()?;
     let snapshots = args.report.then_some(if methods.len() == 1 { SNAPSHOTS } else { SNAPSHOTS_OF_EACH });
     let WatchArgs { record, video, .. } = args.watch.clone();
     let outputs = RunOutputs { overlay: args.overlay, snapshots, record, video };
@@ -266,6 +273,9 @@ pub fn run_at(args: &RunArgs, pace: Pace, terminal: Terminal) -> Result<()> {
         if methods.len() == 1 {
             text += &summary::of_one(&report, run)?;
         }
+    }
+    if let Some((path, result)) = vslam_lab.as_deref().zip(only_results.first()) {
+        failures.keep(write_trajectory_as(path, &result.outcome.keyframes, TrajectoryFormat::VslamLab));
     }
     let page = args.report.then(|| html::write(&out, &runs, &reading.and(&detection.stages)));
     let page = page.and_then(|page| failures.keep(page));
@@ -363,9 +373,10 @@ impl RunArgs {
         );
         let mut options = self.map.single_method_options();
         options.extend(self.resume.then_some("--resume"));
+        options.extend(self.vslam_lab.is_some().then_some("--vslam-lab"));
         ensure!(
             methods.len() == 1 || options.is_empty(),
-            "{} cannot be used with several methods, because each method makes its own map; give one --method",
+            "{} cannot be used with several methods, because each method makes its own map and files; give one --method",
             options.join(" and ")
         );
         Ok(methods)

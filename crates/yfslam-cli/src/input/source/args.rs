@@ -21,7 +21,7 @@ pub const ASSOCIATION_TOLERANCE_MS: f64 = 20.0;
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Input")]
 pub struct SourceArgs {
-    /// Folder of a recording in any of the layouts of --layout, a bag (.bag, .mcap, .db3 or folder), a synthetic world such as `synth:walking_xyz?seed=7`, or - for frames on standard input.
+    /// Folder of a recording in any of the layouts of --layout, a bag (.bag, .mcap, .db3 or folder), a video of one camera (.mp4, .mkv, …, through ffmpeg), a synthetic world such as `synth:walking_xyz?seed=7`, or - for frames on standard input.
     #[arg(
         value_name = "SEQUENCE",
         help_heading = None,
@@ -42,7 +42,7 @@ pub struct SourceArgs {
     /// Folder of the depth images, where there is no list [default: depth and similar names in the folder].
     #[arg(long, value_name = "DIR")]
     pub depth: Option<PathBuf>,
-    /// Frames per second of images without time stamps [default: 30].
+    /// Frames per second of images without time stamps [default: 30]; for a video, in place of its own time stamps.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub fps: Option<f64>,
     /// Camera: a preset such as tum1, bonn or d435i, or a camera file of any common kind [default: the camera file in the folder].

@@ -28,7 +28,8 @@ pub struct BagArgs {
     /// Topic of the calibration in a bag [default: that beside the colour or left images].
     #[arg(long, value_name = "TOPIC")]
     camera_info_topic: Option<String>,
-    /// Topic of the ground truth in a bag: PoseStamped, Odometry, TransformStamped or TF.
+    /// Topic of the ground truth in a bag: PoseStamped, Odometry, TransformStamped or TF; of TF also a chain of transforms, as in
+    /// /tf:map.camera_link.
     #[arg(long, value_name = "TOPIC")]
     truth_topic: Option<String>,
     /// Frame of the body whose poses --truth-topic has; /tf_static leads from it to the camera [default: that of the messages].

@@ -60,6 +60,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
         depth_source: sequence.depth_source,
         frames: Frames::new(Player::Folder(Box::new((stream, extras))), sequence.depth_source, args, &stamps_ns),
         stamps_ns,
+        topics: sequence.topics(),
         association: Some(sequence.report),
         truth_reader: Some(sequence.ground_truth),
         masks: tally,

@@ -17,7 +17,7 @@ use anyhow::Result;
 use yfslam::Camera;
 use yfslam::config::DepthSource;
 use yfslam_eval::StampedPose;
-use yfslam_io::sequence::{AssociationReport, GroundTruthReader};
+use yfslam_io::sequence::{AssociationReport, GroundTruthReader, UsedTopics};
 use yfslam_io::time::TimeMirror;
 use yfslam_io::trajectory::mirror_trajectory;
 use yfslam_io::{CameraSource, TrajectoryFile};
@@ -51,6 +51,8 @@ pub struct Source {
     pub stamps_ns: Vec<i64>,
     /// Result of pairing colour images with depth or right images; `None` for synthetic worlds.
     pub association: Option<AssociationReport>,
+    /// The topics in use; `None` unless the sequence is a bag.
+    pub topics: Option<UsedTopics>,
     /// Which frames have a mask; `None` without `--masks`.
     pub masks: Option<MaskTally>,
     /// Reads ground truth in the format of the folder; `None` for synthetic worlds.

@@ -52,6 +52,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource) -> Result<Source> {
         frames: Frames::new(Player::Pipe(Box::new(header.frames(&camera))), depth_source, args, &[]),
         camera,
         stamps_ns: Vec::new(),
+        topics: None,
         association: None,
         truth_reader: None,
         masks: None,

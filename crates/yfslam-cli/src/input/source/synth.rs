@@ -72,6 +72,7 @@ pub fn open(args: &SourceArgs, configured: DepthSource, own_boxes: Option<&[Stri
         depth_source,
         frames: Frames::new(Player::Synth(renderer), depth_source, args, &stamps_ns),
         stamps_ns,
+        topics: None,
         association: None,
         truth_reader: None,
         masks: None,

@@ -17,12 +17,11 @@ pub fn read(settings: &mut Settings) -> Result<Draft> {
     let motion = motion(settings, &["cam1.T_cn_cnm1"])?;
     // A right camera of another model concerns stereo cameras only, and is then named as the problem.
     match camera(settings, "cam1") {
-        Ok(right) => {
-            let is_distorted = right.lens != Lens::default();
-            draft = with_right(
-                draft,
-                &Right { intrinsics: right.intrinsics, is_distorted, motion, key: "cam1.intrinsics" },
-            );
+        Ok(Draft { intrinsics, lens, size, .. }) => {
+            // It takes points of cam0 to cam1.
+            let is_right_in_left = false;
+            draft =
+                with_right(draft, &Right { intrinsics, lens, size, motion, is_right_in_left, key: "cam1.intrinsics" });
         }
         Err(error) => draft.stereo_problem = Some(error.to_string()),
     }

@@ -71,9 +71,22 @@ pub fn read(settings: &mut Settings) -> Result<Draft> {
     if let Some(matrix) = settings.exactly::<9>(&[second])? {
         let right = Draft::from_matrix(&matrix, 3).ok_or_else(|| no_pinhole(settings, &[second]))?;
         let coefficients = settings.numbers(&["D2", "distCoeffs2"])?.unwrap_or_default();
-        let is_distorted = coefficients.iter().any(|&value| value != 0.0);
-        let motion = motion(settings, &["T_c1_c2"])?;
-        draft = with_right(draft, &Right { intrinsics: right.intrinsics, is_distorted, motion, key: second });
+        let lens = Lens::of_opencv(&coefficients, settings, "D2")?;
+        let (of_right, of_left) = (motion(settings, &["T_c1_c2"])?, stereo_calibrate(settings)?);
+        let (is_right_in_left, motion) = (of_right.is_some(), of_right.or(of_left));
+        let (intrinsics, size) = (right.intrinsics, draft.size);
+        draft = with_right(draft, &Right { intrinsics, lens, size, motion, is_right_in_left, key: second });
     }
     Ok(draft)
+}
+
+/// Returns `R` and `T` of `stereoCalibrate`, which take points of the first camera to the second, as a 4 × 4 matrix.
+fn stereo_calibrate(settings: &mut Settings) -> Result<Option<Vec<f64>>> {
+    let (rotation, translation) = (settings.numbers(&["R"])?, settings.numbers(&["T"])?);
+    Ok(match (rotation.as_deref(), translation.as_deref()) {
+        (Some(&[a, b, c, d, e, f, g, h, i]), Some(&[x, y, z])) => {
+            Some(vec![a, b, c, x, d, e, f, y, g, h, i, z, 0.0, 0.0, 0.0, 1.0])
+        }
+        _ => None,
+    })
 }

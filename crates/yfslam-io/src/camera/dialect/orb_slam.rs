@@ -68,8 +68,10 @@ pub fn read(settings: &mut Settings) -> Result<Draft> {
             settings.required(&["Camera2.cx"])?,
             settings.required(&["Camera2.cy"])?,
         ],
-        is_distorted: lens(settings, &["Camera2"])? != Lens::default(),
+        lens: lens(settings, &["Camera2"])?,
+        size: draft.size,
         motion: motion(settings, &["Stereo.T_c1_c2", "Tlr"])?,
+        is_right_in_left: true,
         key: "Camera2.fx",
     };
     let given = draft.bf.take();

@@ -1,35 +1,73 @@
-//! The second camera of a stereo pair in a calibration: used where the images are rectified, else the reason why it cannot be.
+//! The second camera of a stereo pair in a calibration: the baseline where the images are rectified, else what they are rectified by.
 
-use super::super::draft::Draft;
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+use yfslam::Camera;
+
+use super::super::draft::{Draft, Lens};
 use super::super::settings::Settings;
+use super::super::source::RightCamera;
 use crate::error::Result;
 
 /// Largest deviation of a rectified pair, px for intrinsics, and without unit for rotations.
 const TOLERANCE: f64 = 1e-6;
 
+/// Largest deviation of a rotation matrix from orthonormality: files have few decimals.
+const MAX_ROTATION_ERROR: f64 = 1e-3;
+
 /// Calibration of the right camera relative to the left one.
-pub struct Right<'k> {
+pub struct Right {
     /// Intrinsics of the right camera: fx, fy, cx, cy.
     pub intrinsics: [f64; 4],
-    pub is_distorted: bool,
-    /// Pose of one camera in the other as a 4 × 4 matrix, row by row; the direction does not matter.
+    pub lens: Lens,
+    /// Width and height, px, if the file has them.
+    pub size: Option<[usize; 2]>,
+    /// Pose of one camera in the other as a 4 × 4 matrix, row by row.
     pub motion: Option<Vec<f64>>,
+    /// Whether the matrix takes points of the right camera to the left one.
+    pub is_right_in_left: bool,
     /// The key that describes the right camera.
-    pub key: &'k str,
+    pub key: &'static str,
 }
 
-/// Takes the baseline from a pair that is rectified; else keeps the reason why the file cannot serve a stereo camera.
-pub fn with_right(draft: Draft, right: &Right<'_>) -> Draft {
-    let left_distorted = draft.lens != Default::default();
+/// Takes the baseline from a pair that is rectified; else keeps the right camera for the rectification of the images, and the reason why
+/// they cannot be used as they are.
+pub fn with_right(draft: Draft, right: &Right) -> Draft {
+    let is_distorted = draft.lens != Lens::default() || right.lens != Lens::default();
     let same = draft.intrinsics.iter().zip(right.intrinsics).all(|(a, b)| (a - b).abs() < TOLERANCE);
     match right.motion.as_deref().and_then(baseline) {
-        Some(baseline_m) if same && !left_distorted && !right.is_distorted => draft.with_baseline(Some(baseline_m)),
+        Some(baseline_m) if same && !is_distorted => draft.with_baseline(Some(baseline_m)),
         _ => {
             let problem =
                 format!("{} describes a second camera whose images are not rectified with the first", right.key);
-            Draft { stereo_problem: Some(problem), ..draft }
+            let reason = if right.motion.is_none() { ", and its pose is missing" } else { "" };
+            Draft { stereo_problem: Some(problem + reason), right: right.camera(), ..draft }
         }
     }
+}
+
+impl Right {
+    /// Returns the right camera; `None` if its pose is not known.
+    fn camera(&self) -> Option<RightCamera> {
+        let t = rigid_motion(self.motion.as_deref()?)?;
+        let ([fx, fy, cx, cy], [width, height]) = (self.intrinsics, self.size.unwrap_or_default());
+        let mut camera = Camera::pinhole(width, height, fx, fy, cx, cy).with_distortion(self.lens.polynomial);
+        camera.rational = self.lens.rational;
+        let t_left_right = if self.is_right_in_left { t } else { t.inverse() };
+        Some(RightCamera { camera, t_left_right, key: self.key })
+    }
+}
+
+/// Returns the motion that a 4 × 4 matrix describes, if it is one.
+fn rigid_motion(motion: &[f64]) -> Option<Isometry3<f64>> {
+    let rows: &[f64; 16] = motion.try_into().ok()?;
+    let [a, b, c, x, d, e, f, y, g, h, i, z, ..] = *rows;
+    let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
+    let error = (matrix * matrix.transpose() - Matrix3::identity()).norm();
+    let is_rotation =
+        error < MAX_ROTATION_ERROR && matrix.determinant() > 0.0 && [x, y, z].iter().all(|v| v.is_finite());
+    // The nearest rotation, because files have few decimals.
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&matrix));
+    is_rotation.then(|| Isometry3::from_parts(Translation3::new(x, y, z), rotation))
 }
 
 /// Returns the distance of two cameras if one is beside the other without a rotation, m.

@@ -24,7 +24,7 @@ pub struct TopicChoice {
     pub right: Option<String>,
     /// Topic of the calibration of the colour or left camera.
     pub camera_info: Option<String>,
-    /// Topic of the ground truth: `PoseStamped`, `Odometry`, `TransformStamped` or TF.
+    /// Topic of the ground truth: `PoseStamped`, `Odometry`, `TransformStamped` or TF; `/tf:map.base_link` composes transforms.
     pub truth: Option<String>,
     /// Frame of the body whose poses the ground truth has, and to which the camera is mounted.
     pub base_frame: Option<String>,

@@ -20,6 +20,7 @@ use crate::bag::{Bag, MessageRef, Need};
 use crate::error::{Error, Result};
 use crate::message::MessageType;
 use crate::time::format_stamp;
+use crate::trajectory::read_topic;
 pub use camera::camera_of_topic;
 pub use choose::TopicChoice;
 use choose::{Chosen, ImageTopic, Survey};
@@ -83,20 +84,33 @@ pub fn list(path: &Path, options: &SequenceOptions) -> Result<Listing> {
     let paired = chosen.paired.as_ref().map(|paired| list(lists.next(), &paired.name));
     let (entries, report) = from_lists(path, color, paired, options.association_tolerance_ns)?;
 
-    let ground_truth = match truth.and_then(|truth| bag.topics().get(truth)) {
-        Some(topic) => {
+    let ground_truth = match (truth.and_then(|truth| bag.topics().get(truth)), chain(options)) {
+        (Some(topic), _) => {
             let (truth, note) = poses.truth(path, &topic.name, camera_frame, &options.topics)?;
             notes.push(note);
-            GroundTruthReader::bag(path.into(), truth)
+            GroundTruthReader::bag(path.into(), truth, topic.name.clone())
         }
-        None => GroundTruthReader::none(),
+        (None, Some(chain)) => {
+            let (mut file, body) = read_topic(&bag, Some(chain), "--truth-topic")?;
+            let said = poses.moved_to_camera(&mut file.poses, &body, camera_frame);
+            notes.append(&mut file.notes);
+            let source = file.source.unwrap_or_default();
+            notes.push(format!("ground truth: {} poses of {source}, {said}", file.poses.len()));
+            GroundTruthReader::bag(path.into(), file.poses, chain.to_owned())
+        }
+        (None, None) => GroundTruthReader::none(),
     };
     Ok(Listing { depth_source: chosen.depth_source, entries, report, calibration, ground_truth, notes })
 }
 
-/// Returns the index of the topic of the ground truth, if one was asked for.
+/// Returns the topic of the ground truth if it names two frames, as in `/tf:map.camera_link`, which several transforms may connect.
+fn chain(options: &SequenceOptions) -> Option<&str> {
+    options.topics.truth.as_deref().filter(|name| name.contains(':'))
+}
+
+/// Returns the index of the topic of the ground truth, if one was asked for by its name alone.
 fn truth_topic(bag: &Bag, options: &SequenceOptions) -> Result<Option<usize>> {
-    let Some(name) = &options.topics.truth else { return Ok(None) };
+    let Some(name) = options.topics.truth.as_ref().filter(|_| chain(options).is_none()) else { return Ok(None) };
     let is_pose = |kind| matches!(kind, Some(MessageType::Tf | MessageType::Pose | MessageType::PoseOfChild));
     let found =
         bag.topics().iter().position(|topic| topic.name == *name && is_pose(topic.kind) && topic.wire.is_some());

@@ -9,7 +9,7 @@ use yfslam_eval::StampedPose;
 use super::choose::TopicChoice;
 use crate::error::{Error, Result};
 use crate::message::MessageType;
-use crate::message::types::Transform;
+use crate::message::types::{Transform, frame_name as name};
 use crate::message::wire::{Reader, Wire, WireError};
 
 /// Most frames between a camera and the base of its robot.
@@ -92,6 +92,21 @@ impl Poses {
         ))
     }
 
+    /// Moves poses of a body to the camera, if static transforms connect both; returns what was done.
+    pub fn moved_to_camera(&self, poses: &mut [StampedPose], body: &str, camera: &str) -> String {
+        let mount = if name(body) == name(camera) { None } else { Some(self.between(body, camera)) };
+        if let Some(t_body_cam) = mount.flatten() {
+            poses.iter_mut().for_each(|pose| pose.t_world_cam *= t_body_cam);
+        }
+        match mount {
+            None => format!("those of the camera '{camera}'"),
+            Some(Some(_)) => format!("those of '{body}', to which /tf_static gives the pose of the camera '{camera}'"),
+            Some(None) => format!(
+                "those of '{body}', taken as those of the camera, because no static transform leads to '{camera}'"
+            ),
+        }
+    }
+
     /// Returns the poses of the camera, and what was done for it.
     pub fn truth(
         self,
@@ -120,29 +135,18 @@ impl Poses {
             }
         };
         let body = if child.is_empty() { base.unwrap_or("").to_owned() } else { child.clone() };
-        let mount =
-            if body.is_empty() || name(&body) == name(camera) { None } else { Some(self.between(&body, camera)) };
-        let t_body_cam = mount.flatten().unwrap_or(Isometry3::identity());
-        let said = match mount {
-            None if body.is_empty() => "taken as those of the camera".to_owned(),
-            None => format!("those of the camera '{camera}'"),
-            Some(Some(_)) => format!("those of '{body}', to which /tf_static gives the pose of the camera '{camera}'"),
-            Some(None) => format!(
-                "those of '{body}', taken as those of the camera, because no static transform leads to '{camera}'"
-            ),
-        };
         let selected = self.truth.iter().filter(|pose| pose.parent == parent && pose.child == child);
-        let poses = selected.map(|pose| StampedPose::new(pose.stamp_ns, pose.t_parent_child * t_body_cam));
+        let poses = selected.map(|pose| StampedPose::new(pose.stamp_ns, pose.t_parent_child));
         let mut poses: Vec<StampedPose> = poses.collect();
+        let said = if body.is_empty() {
+            "taken as those of the camera".to_owned()
+        } else {
+            self.moved_to_camera(&mut poses, &body, camera)
+        };
         poses.sort_by_key(|pose| pose.timestamp_ns);
         let damaged =
             if self.unreadable > 0 { format!("; {} messages are damaged", self.unreadable) } else { String::new() };
         let note = format!("ground truth from {topic}: {} poses in '{parent}', {said}{damaged}", poses.len());
         Ok((poses, note))
     }
-}
-
-/// Returns the name of a frame without the slash that early versions of tf wrote.
-fn name(frame: &str) -> String {
-    frame.trim_start_matches('/').to_owned()
 }
