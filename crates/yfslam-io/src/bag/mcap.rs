@@ -40,7 +40,7 @@ pub fn summary_start(file: &BagFile) -> Result<Option<u64>> {
 /// Returns whether the summary counts the messages. Without that, they must be counted one by one.
 fn has_statistics(file: &BagFile, start: u64, end: u64) -> bool {
     let (mut at, mut head) = (start, Vec::new());
-    while at + RECORD_HEAD <= end && file.read_at(at, RECORD_HEAD, &mut head).is_ok() {
+    while at.saturating_add(RECORD_HEAD) <= end && file.read_at(at, RECORD_HEAD, &mut head).is_ok() {
         let mut fields = Fields(&head);
         let (kind, length) = (fields.u8(), fields.u64().unwrap_or(u64::MAX));
         if kind == Some(STATISTICS) {
@@ -215,4 +215,21 @@ fn statistics(walk: &mut Walk<'_>, mut fields: Fields<'_>) -> Option<()> {
 
 fn to_ns(time: u64) -> i64 {
     i64::try_from(time).unwrap_or(i64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With overflow checks, as in the weekly run of all tests, such a sum would be a panic.
+    #[test]
+    fn a_record_of_the_summary_that_ends_beyond_all_files_is_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        let record = |kind: u8, content: &[u8], length: u64| [&[kind][..], &length.to_le_bytes(), content].concat();
+        let footer = [(MAGIC.len() as u64).to_le_bytes().to_vec(), vec![0; 12]].concat();
+        let bytes = [MAGIC, &record(3, &[0; 40], u64::MAX), &record(FOOTER, &footer, 20), MAGIC].concat();
+        std::fs::write(&path, bytes).unwrap();
+        assert_eq!(summary_start(&BagFile::open(&path).unwrap()).unwrap(), None);
+    }
 }
