@@ -29,6 +29,7 @@ if [ -z "${TMPDIR:-}" ] && [ -w /dev/shm ]; then
     export TMPDIR=/dev/shm
 fi
 cargo "${toolchain[@]}" fuzz build -s "$sanitizer" || exit 1
+programs=$CARGO_TARGET_DIR/$(rustc -vV | sed -n 's/^host: //p')/release
 
 printf '%-20s %12s %10s %10s %12s  %s\n' target executions exec/s 'peak MB' 'slowest, s' result
 total=0
@@ -36,7 +37,9 @@ failed=0
 for target in "${targets[@]}"; do
     mkdir -p "$found/$target"
     log=$found/$target.log
-    cargo "${toolchain[@]}" fuzz run -s "$sanitizer" "$target" "$found/$target" "fuzz/corpus/$target" -- \
+    mkdir -p "fuzz/artifacts/$target"
+    # Not through cargo, which would build anew if a source has changed meanwhile.
+    "$programs/$target" "$found/$target" "fuzz/corpus/$target" -artifact_prefix="fuzz/artifacts/$target/" \
         -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 >"$log" 2>&1
     status=$?
     number() { sed -n "s/^stat::$1: *//p" "$log" | tail -1; }
