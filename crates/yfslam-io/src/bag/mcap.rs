@@ -152,11 +152,13 @@ fn chunk<R: Source>(
     }
     head.extend(records.take(u64::from(name) + 8)?);
     let record = [&[CHUNK][..], &length.to_le_bytes(), &head].concat();
+    // What is left of the record after the head; a forged length may be shorter than the head.
+    let rest = length.checked_sub(record.len() as u64 - RECORD_HEAD).ok_or(Stop::Damaged(begin))?;
     let head = match chunk_head(&record) {
-        Some(Ok(head)) if head.data_offset - RECORD_HEAD + head.packed_length <= length => head,
+        Some(Ok(head)) if head.packed_length <= rest => head,
         Some(Err(problem)) => {
             outer.note(format!("the chunk at byte {begin} is left out: {problem}"));
-            return records.skip(length - (record.len() as u64 - RECORD_HEAD));
+            return records.skip(rest);
         }
         _ => return Err(Stop::Damaged(begin)),
     };
@@ -231,5 +233,21 @@ mod tests {
         let bytes = [MAGIC, &record(3, &[0; 40], u64::MAX), &record(FOOTER, &footer, 20), MAGIC].concat();
         std::fs::write(&path, bytes).unwrap();
         assert_eq!(summary_start(&BagFile::open(&path).unwrap()).unwrap(), None);
+    }
+
+    /// Sums of such lengths would be small again, so that the chunk would be taken for an empty one.
+    #[test]
+    fn chunks_that_are_shorter_than_their_head_or_longer_than_their_record_are_damaged() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        for (length, name, packed) in [(4u64, "new", 0u64), (43, "new", 0), (40, "", u64::MAX - 5)] {
+            let name = [&(name.len() as u32).to_le_bytes(), name.as_bytes()].concat();
+            let head = [&[CHUNK][..], &length.to_le_bytes(), &[0; 28], &name, &packed.to_le_bytes()].concat();
+            std::fs::write(&path, [MAGIC, &head, &[0; 40]].concat()).unwrap();
+            let bag = crate::Bag::open(&path).unwrap();
+            let notes = bag.notes().join("; ");
+            let expected = if length == 43 { "'new' is not understood" } else { "damaged" };
+            assert!(notes.contains(expected), "{length}: {notes}");
+        }
     }
 }
