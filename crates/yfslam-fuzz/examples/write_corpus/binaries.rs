@@ -309,6 +309,8 @@ fn runs() -> Vec<File> {
         ("frames", "good", vec![0; 8]),
         ("frames", "damaged", all_damages),
         ("frames", "damaged-full", more_damages),
+        // Times that are further apart than the numbers of nanoseconds reach.
+        ("frames", "longest-gap", vec![3, 0, 0, 0, 4]),
         ("frames", "bad-all-refused", vec![6, 9, 10, 6]),
     ]
 }
