@@ -40,7 +40,7 @@ pub fn summary_start(file: &BagFile) -> Result<Option<u64>> {
 /// Returns whether the summary counts the messages. Without that, they must be counted one by one.
 fn has_statistics(file: &BagFile, start: u64, end: u64) -> bool {
     let (mut at, mut head) = (start, Vec::new());
-    while at + RECORD_HEAD <= end && file.read_at(at, RECORD_HEAD, &mut head).is_ok() {
+    while at.saturating_add(RECORD_HEAD) <= end && file.read_at(at, RECORD_HEAD, &mut head).is_ok() {
         let mut fields = Fields(&head);
         let (kind, length) = (fields.u8(), fields.u64().unwrap_or(u64::MAX));
         if kind == Some(STATISTICS) {
@@ -152,11 +152,13 @@ fn chunk<R: Source>(
     }
     head.extend(records.take(u64::from(name) + 8)?);
     let record = [&[CHUNK][..], &length.to_le_bytes(), &head].concat();
+    // What is left of the record after the head; a forged length may be shorter than the head.
+    let rest = length.checked_sub(record.len() as u64 - RECORD_HEAD).ok_or(Stop::Damaged(begin))?;
     let head = match chunk_head(&record) {
-        Some(Ok(head)) if head.data_offset - RECORD_HEAD + head.packed_length <= length => head,
+        Some(Ok(head)) if head.packed_length <= rest => head,
         Some(Err(problem)) => {
             outer.note(format!("the chunk at byte {begin} is left out: {problem}"));
-            return records.skip(length - (record.len() as u64 - RECORD_HEAD));
+            return records.skip(rest);
         }
         _ => return Err(Stop::Damaged(begin)),
     };
@@ -215,4 +217,37 @@ fn statistics(walk: &mut Walk<'_>, mut fields: Fields<'_>) -> Option<()> {
 
 fn to_ns(time: u64) -> i64 {
     i64::try_from(time).unwrap_or(i64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With overflow checks, as in the weekly run of all tests, such a sum would be a panic.
+    #[test]
+    fn a_record_of_the_summary_that_ends_beyond_all_files_is_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        let record = |kind: u8, content: &[u8], length: u64| [&[kind][..], &length.to_le_bytes(), content].concat();
+        let footer = [(MAGIC.len() as u64).to_le_bytes().to_vec(), vec![0; 12]].concat();
+        let bytes = [MAGIC, &record(3, &[0; 40], u64::MAX), &record(FOOTER, &footer, 20), MAGIC].concat();
+        std::fs::write(&path, bytes).unwrap();
+        assert_eq!(summary_start(&BagFile::open(&path).unwrap()).unwrap(), None);
+    }
+
+    /// Sums of such lengths would be small again, so that the chunk would be taken for an empty one.
+    #[test]
+    fn chunks_that_are_shorter_than_their_head_or_longer_than_their_record_are_damaged() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        for (length, name, packed) in [(4u64, "new", 0u64), (43, "new", 0), (40, "", u64::MAX - 5)] {
+            let name = [&(name.len() as u32).to_le_bytes(), name.as_bytes()].concat();
+            let head = [&[CHUNK][..], &length.to_le_bytes(), &[0; 28], &name, &packed.to_le_bytes()].concat();
+            std::fs::write(&path, [MAGIC, &head, &[0; 40]].concat()).unwrap();
+            let bag = crate::Bag::open(&path).unwrap();
+            let notes = bag.notes().join("; ");
+            let expected = if length == 43 { "'new' is not understood" } else { "damaged" };
+            assert!(notes.contains(expected), "{length}: {notes}");
+        }
+    }
 }

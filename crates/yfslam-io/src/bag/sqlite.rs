@@ -53,7 +53,7 @@ impl<'a> Database<'a> {
         };
         let reserved = u64::from(*head.get(20)?);
         let is_valid = page_size.is_power_of_two() && page_size >= 512 && page_size - reserved >= 480;
-        is_valid.then_some(Self { file, page_size, usable: page_size - reserved })
+        is_valid.then(|| Self { file, page_size, usable: page_size - reserved })
     }
 
     /// Returns the first page of a table and the names of its columns.
@@ -251,4 +251,25 @@ fn column_names(sql: &str) -> Vec<String> {
         column.split_whitespace().next().unwrap_or("").trim_matches(['"', '`', '[', ']', '\'']).to_lowercase()
     };
     inside.split(',').map(name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With overflow checks, as in the weekly run of all tests, such a difference would be a panic.
+    #[test]
+    fn pages_smaller_than_what_is_reserved_of_them_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.db3");
+        for (size, reserved, is_valid) in [(0u16, 200, false), (3, 4, false), (512, 200, false), (512, 0, true)] {
+            let mut bytes = vec![0; 512];
+            bytes[..16].copy_from_slice(b"SQLite format 3\0");
+            bytes[16..18].copy_from_slice(&size.to_be_bytes());
+            bytes[20] = reserved;
+            std::fs::write(&path, bytes).unwrap();
+            let file = BagFile::open(&path).unwrap();
+            assert_eq!(Database::open(&file).is_some(), is_valid, "{size} {reserved}");
+        }
+    }
 }

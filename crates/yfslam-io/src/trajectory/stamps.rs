@@ -53,7 +53,11 @@ fn unit(stamps: &[(usize, &str)]) -> (i64, &'static str) {
     steps.retain(|step| *step > 0.0);
     steps.sort_unstable_by(f64::total_cmp);
     let Some(median) = steps.get(steps.len() / 2) else { return if is_large { nanoseconds } else { seconds } };
-    let plausible = |(power, _): &(i64, &str)| median * 10f64.powi(*power as i32 - 9) <= MAX_STEP_S;
+    // Nanoseconds since 1970 every 5 ms would be microseconds every 5 s by their step alone, but such times do not exist.
+    let largest = values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let plausible = |(power, _): &(i64, &str)| {
+        median * 10f64.powi(*power as i32 - 9) <= MAX_STEP_S && largest * 10f64.powi(*power as i32) < i64::MAX as f64
+    };
     // Seconds are out of the question for large stamps, whatever their step.
     UNITS.into_iter().skip(usize::from(is_large)).find(plausible).unwrap_or(if is_large {
         nanoseconds
@@ -77,6 +81,7 @@ mod tests {
         for (texts, first_ns, word) in [
             (["1305031102.175304", "1305031102.211214"], 1_305_031_102_175_304_000, None),
             (["1403636579763555584", "1403636579813555456"], 1_403_636_579_763_555_584, Some("nanoseconds")),
+            (["1403636579763555584", "1403636579768555776"], 1_403_636_579_763_555_584, Some("nanoseconds")),
             (["1.403636579763555584e+18", "1.403636579813555456e+18"], 1_403_636_579_763_555_584, Some("nanoseconds")),
             (["1403636579763555", "1403636579813555"], 1_403_636_579_763_555_000, Some("microseconds")),
             (["1403636579763", "1403636579813"], 1_403_636_579_763_000_000, Some("milliseconds")),

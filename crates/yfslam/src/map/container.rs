@@ -30,6 +30,11 @@ pub(crate) const DENSE_MAP: Section = Section { magic: "yfslam dense map", versi
 /// Section with the map frame.
 pub(crate) const FRAME: Section = Section { magic: "yfslam frame", version: 1, rational_version: 1 };
 
+/// Bytes to which the records of any section may unpack, and how many times its length those of a large one may. Descriptors and depths
+/// hardly repeat, so that a map stays far below it; without a bound, a forged file of a few kilobytes would take all memory.
+const ALWAYS_UNPACKED_BYTES: u64 = 64 << 20;
+const MAX_RATIO: u64 = 200;
+
 /// The sections of a file. Their lengths and checksums are right.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sections<'a> {
@@ -177,8 +182,31 @@ impl PackedSection<'_> {
     pub(crate) fn unpack<T: DeserializeOwned>(self) -> Result<T, ContainerError> {
         let wrong = |error: &dyn std::fmt::Display| ContainerError::Records(error.to_string());
         let mut plain = Vec::new();
-        let mut decoder = ruzstd::decoding::StreamingDecoder::new(self.0).map_err(|e| wrong(&e))?;
-        std::io::Read::read_to_end(&mut decoder, &mut plain).map_err(|e| wrong(&e))?;
+        let decoder = ruzstd::decoding::StreamingDecoder::new(self.0).map_err(|e| wrong(&e))?;
+        let most = MAX_RATIO.saturating_mul(self.0.len() as u64).max(ALWAYS_UNPACKED_BYTES);
+        std::io::Read::read_to_end(&mut std::io::Read::take(decoder, most + 1), &mut plain).map_err(|e| wrong(&e))?;
+        if plain.len() as u64 > most {
+            let packed = self.0.len();
+            return Err(wrong(&format!(
+                "{packed} bytes unpack to more than {most}, which no map does; use another copy"
+            )));
+        }
         postcard::from_bytes(&plain).map_err(|e| wrong(&e))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame of Zstandard whose blocks repeat one byte (RFC 8878, section 3.1.1.2): four bytes stand for 128 KiB.
+    #[test]
+    fn a_section_that_unpacks_to_far_more_than_a_map_does_is_refused() {
+        let block = |last: u32| ((128 << 10) << 3 | 1 << 1 | last).to_le_bytes();
+        let blocks =
+            (0..1000).map(|number| block(u32::from(number == 999))).flat_map(|head| [head[0], head[1], head[2], 7]);
+        let packed: Vec<u8> = [0x28, 0xb5, 0x2f, 0xfd, 0x00, 0x58].into_iter().chain(blocks).collect();
+        let error = PackedSection(&packed).unpack::<Vec<u8>>().unwrap_err().to_string();
+        assert!(error.contains("4006 bytes unpack to more than 67108864"), "{error}");
     }
 }

@@ -162,7 +162,8 @@ impl Tracker {
 
     /// Time from the last frame to the current one, s.
     fn seconds_since_last(&self) -> f64 {
-        (self.current.timestamp_ns - self.last.timestamp_ns) as f64 * 1e-9
+        // A clock may jump from one end of time to the other.
+        self.current.timestamp_ns.saturating_sub(self.last.timestamp_ns) as f64 * 1e-9
     }
 
     /// Motion from the last frame to the current one, if both poses are known.
@@ -232,8 +233,7 @@ impl Tracker {
     /// Estimates the first pose from the last frame or, if that fails, from the reference keyframe. Returns whether it succeeded.
     fn estimate_first_pose(&mut self, context: &Context, map: &Map) -> bool {
         let config = &context.config;
-        let gap_s = (self.current.timestamp_ns - self.last.timestamp_ns) as f64 * 1e-9;
-        if gap_s > config.tracking.max_gap_s {
+        if self.seconds_since_last() > config.tracking.max_gap_s {
             self.velocity = None;
         }
         (self.velocity.is_some() && self.track_motion_model(context, map))
@@ -429,5 +429,17 @@ impl Tracker {
         self.current.reference = None;
         self.current.t_cam_world = Pose::identity();
         self.current.clear_matches();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_at_both_ends_of_time_are_far_apart() {
+        let mut tracker = Tracker::default();
+        (tracker.last.timestamp_ns, tracker.current.timestamp_ns) = (i64::MIN, i64::MAX);
+        assert!(tracker.seconds_since_last() > 9e9, "{}", tracker.seconds_since_last());
     }
 }

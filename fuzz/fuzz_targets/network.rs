@@ -1,0 +1,2 @@
+#![no_main]
+yfslam_fuzz_targets::fuzz!("network");
