@@ -44,6 +44,7 @@ pub mod faults;
 mod frame_pipe;
 pub mod message;
 pub mod rectify;
+mod rotation;
 pub mod sequence;
 pub mod stream;
 mod text;

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Matrix4, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix4, Quaternion, Translation3, UnitQuaternion};
 use yfslam::Camera;
 use yfslam::config::DepthSource;
 
@@ -17,12 +17,10 @@ use super::{GroundTruthReader, ListedImage, SequenceOptions};
 use crate::camera::{CameraSource, check_camera};
 use crate::error::{Error, Result};
 use crate::rectify::{MountedCamera, StereoRectification};
+use crate::rotation;
 use crate::text::{content_lines, read_text};
 use crate::time::parse_stamp_ns;
 use crate::trajectory::{StampedPose, TrajectoryFile};
-
-/// Largest deviation of a rotation matrix from orthonormality.
-const MAX_ROTATION_ERROR: f64 = 1e-3;
 
 /// Returns the folder that holds `cam0`: `mav0` inside `folder`, or `folder` itself.
 pub fn root(folder: &Path) -> Option<PathBuf> {
@@ -171,12 +169,8 @@ fn exactly<const N: usize>(numbers: Vec<f64>, key: &str, path: &Path) -> Result<
 /// Converts a row-major matrix into a rigid motion; `None` if it is not one.
 fn rigid_motion(rows: [f64; 16]) -> Option<Isometry3<f64>> {
     let matrix = Matrix4::from_row_slice(&rows);
-    let rotation: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into();
-    let error = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-    let is_rotation = error < MAX_ROTATION_ERROR && rotation.determinant() > 0.0;
-    let translation = Translation3::new(matrix[(0, 3)], matrix[(1, 3)], matrix[(2, 3)]);
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-    is_rotation.then(|| Isometry3::from_parts(translation, rotation))
+    let rotation = rotation::nearest_rotation(&matrix.fixed_view::<3, 3>(0, 0).into(), rotation::OF_CALIBRATIONS)?;
+    Some(Isometry3::from_parts(Translation3::new(matrix[(0, 3)], matrix[(1, 3)], matrix[(2, 3)]), rotation))
 }
 
 /// Parses poses of the body, `nanoseconds, px, py, pz, qw, qx, qy, qz, …` on each line, and returns those of the camera.

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
 use yfslam::config::DepthSource;
 use yfslam::{Camera, RgbImage};
 
@@ -15,6 +15,7 @@ use super::{GroundTruthReader, ListedImage, SequenceOptions};
 use crate::camera::{CameraSource, check_camera};
 use crate::decode::decode_color;
 use crate::error::{Error, Result};
+use crate::rotation;
 use crate::text::{content_lines, read_bytes, read_text};
 use crate::time::parse_stamp_ns;
 use crate::trajectory::{StampedPose, TrajectoryFile};
@@ -151,11 +152,8 @@ pub fn parse_ground_truth(
         let bad = || Error::line(path, number, "is not the 3 × 4 matrix of a pose", "write its 12 numbers row by row");
         let m = matrix(line).ok_or_else(bad)?;
         let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
-        if (rotation * rotation.transpose() - Matrix3::identity()).norm() > 1e-2 || rotation.determinant() < 0.0 {
-            return Err(bad());
-        }
+        let rotation = rotation::nearest_rotation(&rotation, rotation::OF_POSES).ok_or_else(bad)?;
         let translation = Translation3::from(Vector3::new(m[3], m[7], m[11]));
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&rotation));
         Ok(StampedPose::new(timestamp_ns, Isometry3::from_parts(translation, rotation) * t_cam0_cam))
     };
     TrajectoryFile::from_poses(lines.into_iter().zip(stamps_ns).map(pose).collect::<Result<_>>()?, path)

@@ -2,14 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix3, Translation3};
 
 use crate::error::{Error, Result};
+use crate::rotation;
 use crate::text::{content_lines, read_text};
 use crate::trajectory::{StampedPose, TrajectoryFile};
-
-/// Largest deviation of a rotation matrix from orthonormality; some files have few decimals.
-const MAX_ROTATION_ERROR: f64 = 1e-2;
 
 /// What a matrix holds.
 enum Matrix {
@@ -67,11 +65,7 @@ fn matrix(text: &str) -> Matrix {
         return Matrix::None;
     }
     let rotation = Matrix3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
-    let error = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-    if error > MAX_ROTATION_ERROR || rotation.determinant() < 0.0 {
-        return Matrix::Bad;
-    }
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&rotation));
+    let Some(rotation) = rotation::nearest_rotation(&rotation, rotation::OF_POSES) else { return Matrix::Bad };
     Matrix::Pose(Isometry3::from_parts(Translation3::new(m[3], m[7], m[11]), rotation))
 }
 

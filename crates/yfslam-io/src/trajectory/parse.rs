@@ -2,18 +2,16 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion};
 
 use super::columns::{QuaternionOrder, columns, order_in_header};
 use super::{FORMAT_CURE, KITTI_PERIOD_NS, StampedPose, TrajectoryFormat, stamps};
 use crate::error::{Error, Result};
+use crate::rotation;
 use crate::text::content_lines;
 
 /// Largest deviation of the length of a quaternion from 1. Files with two decimals stay below it; columns in another order rarely do.
 const MAX_NORM_ERROR: f64 = 0.05;
-
-/// Largest deviation of a rotation matrix from orthonormality.
-const MAX_ROTATION_ERROR: f64 = 1e-2;
 
 /// Names of the columns after the stamp.
 const SCALAR_LAST: [&str; 7] = ["tx", "ty", "tz", "qx", "qy", "qz", "qw"];
@@ -112,11 +110,9 @@ fn matrices(lines: &[(usize, &str)], count: usize, path: &Path) -> Result<Parsed
             return Err(bad("12 numbers are needed".into()));
         };
         let rotation = Matrix3::new(a, b, c, d, e, f, g, h, i);
-        let error = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-        if error.is_nan() || error > MAX_ROTATION_ERROR || rotation.determinant() < 0.0 {
+        let Some(rotation) = rotation::nearest_rotation(&rotation, rotation::OF_POSES) else {
             return Err(bad("is not the matrix of a pose: its rotation is not orthonormal".into()));
-        }
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&rotation));
+        };
         let pose = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
         let timestamp_ns = i64::try_from(index).unwrap_or(i64::MAX).saturating_mul(KITTI_PERIOD_NS);
         poses.push(StampedPose::new(timestamp_ns, pose));

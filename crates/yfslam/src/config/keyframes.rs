@@ -5,10 +5,9 @@ use super::section::config_section;
 config_section! {
     /// Keyframe insertion (ORB-SLAM2, IEEE T-RO 2017, section III-E).
     KeyframeConfig {
-        /// A frame becomes a keyframe when it has fewer inliers than this share of the landmarks of the reference keyframe, or of the inliers
-        /// of the best frame since the last keyframe if that has fewer.
-        /// Source: ORB-SLAM2.
-        reference_ratio: f64 = 0.75, in 0.0..=1.0;
+        /// A frame becomes a keyframe when it has fewer inliers than this share of the landmarks of the reference keyframe.
+        /// Source: chosen: ORB-SLAM2 has 0.75, with matching that accepts more.
+        reference_ratio: f64 = 0.85, in 0.0..=1.0;
         /// The value of `reference_ratio` while the submap has fewer than two keyframes.
         /// Source: ORB-SLAM2.
         first_reference_ratio: f64 = 0.4, in 0.0..=1.0;

@@ -78,8 +78,6 @@ pub(crate) struct Tracker {
     rotation: RotationHistogram,
     reference: Option<KeyFrameId>,
     frames_since_keyframe: u64,
-    /// Most inliers of a frame since the last keyframe.
-    best_inliers: usize,
     /// Landmarks of the frames since the owner of the map last counted them.
     pub observation_counts: ObservationCounts,
     /// Number of landmarks matched as inliers in the current frame.
@@ -381,18 +379,16 @@ impl Tracker {
     }
 
     /// Returns whether the current frame should become a keyframe.
-    pub(crate) fn wants_keyframe(&mut self, context: &Context, map: &Map) -> bool {
+    pub(crate) fn wants_keyframe(&self, context: &Context, map: &Map) -> bool {
         let Some(reference) = self.reference else { return true };
         let frames_since = self.frames_since_keyframe;
-        self.best_inliers = self.best_inliers.max(self.inliers);
-        let (best_inliers, fps) = (self.best_inliers, context.sensor.camera.fps);
-        let summary = FrameSummary { inliers: self.inliers, best_inliers, frames_since, fps };
+        let summary = FrameSummary { inliers: self.inliers, frames_since, fps: context.sensor.camera.fps };
         is_keyframe_wanted(context, map, reference, &self.current, summary)
     }
 
     /// Records that the insertion of the current frame as a keyframe was requested.
     pub(crate) fn keyframe_requested(&mut self) {
-        (self.frames_since_keyframe, self.best_inliers) = (0, 0);
+        self.frames_since_keyframe = 0;
     }
 
     /// Records that an earlier frame became a keyframe, which becomes the reference keyframe.
@@ -422,7 +418,7 @@ impl Tracker {
         self.interval = None;
         self.last_is_tracked = false;
         self.reference = None;
-        (self.frames_since_keyframe, self.best_inliers) = (0, 0);
+        self.frames_since_keyframe = 0;
         self.observation_counts.clear();
         self.inliers = 0;
         self.last.reference = None;

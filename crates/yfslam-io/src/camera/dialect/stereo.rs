@@ -1,18 +1,16 @@
 //! The second camera of a stereo pair in a calibration: the baseline where the images are rectified, else what they are rectified by.
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix3, Translation3};
 use yfslam::Camera;
 
 use super::super::draft::{Draft, Lens};
 use super::super::settings::Settings;
 use super::super::source::RightCamera;
 use crate::error::Result;
+use crate::rotation;
 
 /// Largest deviation of a rectified pair, px for intrinsics, and without unit for rotations.
 const TOLERANCE: f64 = 1e-6;
-
-/// Largest deviation of a rotation matrix from orthonormality: files have few decimals.
-const MAX_ROTATION_ERROR: f64 = 1e-3;
 
 /// Calibration of the right camera relative to the left one.
 pub struct Right {
@@ -61,13 +59,9 @@ impl Right {
 fn rigid_motion(motion: &[f64]) -> Option<Isometry3<f64>> {
     let rows: &[f64; 16] = motion.try_into().ok()?;
     let [a, b, c, x, d, e, f, y, g, h, i, z, ..] = *rows;
-    let matrix = Matrix3::new(a, b, c, d, e, f, g, h, i);
-    let error = (matrix * matrix.transpose() - Matrix3::identity()).norm();
-    let is_rotation =
-        error < MAX_ROTATION_ERROR && matrix.determinant() > 0.0 && [x, y, z].iter().all(|v| v.is_finite());
-    // The nearest rotation, because files have few decimals.
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&matrix));
-    is_rotation.then(|| Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+    let rotation = rotation::nearest_rotation(&Matrix3::new(a, b, c, d, e, f, g, h, i), rotation::OF_CALIBRATIONS)?;
+    let is_finite = [x, y, z].iter().all(|value| value.is_finite());
+    is_finite.then(|| Isometry3::from_parts(Translation3::new(x, y, z), rotation))
 }
 
 /// Returns the distance of two cameras if one is beside the other without a rotation, m.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix3, Translation3};
 use yfslam::Camera;
 use yfslam::config::DepthSource;
 
@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::message::METRES_UNITS;
 use crate::message::types::CameraInfo;
 use crate::rectify::{MountedCamera, StereoRectification};
+use crate::rotation;
 use crate::sequence::layout::Calibration;
 use crate::sequence::{DEFAULT_FPS, SequenceOptions};
 
@@ -67,8 +68,12 @@ pub fn calibration(
                 camera = camera.with_bf(baseline_px);
             } else {
                 let right_camera = camera_of(right, false).map_err(refusal)?.with_fps(fps);
-                let left = MountedCamera { camera, t_body_cam: mount(info, 0.0) };
-                let right = MountedCamera { camera: right_camera, t_body_cam: mount(right, baseline_px / info.p[0]) };
+                let mounted = |camera: Camera, info: &CameraInfo, x_m: f64| {
+                    let no_rotation = || refuse(format!("R is no rotation ({:?})", info.r), "calibrate the pair again");
+                    Ok(MountedCamera { camera, t_body_cam: mount(info, x_m).ok_or_else(no_rotation)? })
+                };
+                let left = mounted(camera, info, 0.0)?;
+                let right = mounted(right_camera, right, baseline_px / info.p[0])?;
                 let stereo = StereoRectification::new(&left, &right)
                     .map_err(|problem| refuse(problem, "check R and P of both calibrations"))?;
                 camera = stereo.camera.clone();
@@ -186,11 +191,11 @@ fn distortion(info: &CameraInfo) -> std::result::Result<([f64; 5], [f64; 3]), Re
     Ok(([0, 1, 2, 3, 4].map(parameter), [5, 6, 7].map(parameter)))
 }
 
-/// Returns the pose of a camera in the frame of the rectified left camera; `x_m` is where it is on the baseline.
-fn mount(info: &CameraInfo, x_m: f64) -> Isometry3<f64> {
+/// Returns the pose of a camera in the frame of the rectified left camera, if R is a rotation; `x_m` is where it is on the baseline.
+fn mount(info: &CameraInfo, x_m: f64) -> Option<Isometry3<f64>> {
     // R turns from the camera to the rectified camera.
-    let rotation = Rotation3::from_matrix(&Matrix3::from_row_slice(&info.r));
-    Isometry3::from_parts(Translation3::new(x_m, 0.0, 0.0), UnitQuaternion::from_rotation_matrix(&rotation))
+    let rotation = rotation::nearest_rotation(&Matrix3::from_row_slice(&info.r), rotation::OF_CALIBRATIONS)?;
+    Some(Isometry3::from_parts(Translation3::new(x_m, 0.0, 0.0), rotation))
 }
 
 /// Returns the median rate of time stamps, frames per second.
